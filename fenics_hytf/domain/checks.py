@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: MIT
+"""Cells that cannot be computed with are refused, by their input number."""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import Mesh
+
+from fenics_hytf import _compat
+from fenics_hytf.scene import Fault, SceneError
+
+
+def jacobian_determinants(mesh: Mesh, X: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Determinant of the Jacobian of every local cell.
+
+    Args:
+        mesh: The mesh.
+        X: Reference coordinates, shape ``(num_points, tdim)``.
+
+    Returns:
+        [m^dim], shape ``(num_local_cells, num_points)``, ghosts included.
+    """
+    gradient = _compat.coordinate_element(mesh).tabulate(1, X)[1:, :, :, 0]
+    nodes = mesh.geometry.x[_compat.geometry_dofmap(mesh)][:, :, : mesh.geometry.dim]
+    return np.linalg.det(np.einsum("jpn,cni->cpij", gradient, nodes))
+
+
+def refuse_inverted_cells(mesh: Mesh) -> None:
+    """Raise where the Jacobian is not positive somewhere on a lattice over the cell.
+
+    The lattice holds the vertices, which decide for linear simplices and bilinear quadrilaterals;
+    elsewhere its spacing of a quarter cell is a practical test, not a proof.
+
+    Args:
+        mesh: The mesh.
+
+    Raises:
+        SceneError: On every rank, naming the first few cells of the input.
+    """
+    cell_type = getattr(basix.CellType, mesh.topology.cell_name())
+    lattice = basix.create_lattice(cell_type, 4, basix.LatticeType.equispaced, True)
+    num_owned = mesh.topology.index_map(mesh.topology.dim).size_local
+    det = jacobian_determinants(mesh, lattice)[:num_owned]
+    # A determinant below round-off of its own cell is no area at all.
+    bad = np.flatnonzero(det.min(axis=1) <= 1e-14 * np.abs(det).max(axis=1, initial=0.0))
+    found = [(int(mesh.topology.original_cell_index[c]), float(det[c].min())) for c in bad]
+    everyone = sorted(item for part in mesh.comm.allgather(found) for item in part)
+    if everyone:
+        listed = ", ".join(f"{cell} ({value:.3g})" for cell, value in everyone[:5])
+        found = f"{len(everyone)} cells with a non-positive Jacobian, by input cell: {listed}"
+        expected = (
+            "convex cells with counter-clockwise (3D: right-handed) nodes; repair them, or reverse "
+            "the surface in the mesh generator"
+        )
+        raise SceneError([Fault("mesh", found, expected)])

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: MIT
+"""All constraints in one sparse matrix: u = T q, and A_q = Tᵀ A T (METHOD, section 6).
+
+Every displacement is either free (it is an unknown of q), held at zero (an empty row of T), or tied:
+equal to the displacement of a partner across the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import FunctionSpace, locate_dofs_topological
+from petsc4py import PETSc
+from scipy.spatial import KDTree
+
+from fenics_hytf.domain.domain import Domain
+from fenics_hytf.scene import Fault, SceneError
+
+# Sides that tie to each other, and the axis across which they do.
+_TIED = (("left", "right", 0), ("front", "back", 1))
+
+
+def constraint_matrix(domain: Domain, boundary: Mapping[str, str]) -> PETSc.Mat:
+    """Build T.
+
+    Args:
+        domain: The domain.
+        boundary: Kind of each boundary: ``rigid`` and ``fixed`` hold every component, ``roller``
+            the normal one, ``tied`` sides move alike; ``free`` and unnamed ones are free, except
+            that ``base`` is rigid unless it is named.
+
+    Returns:
+        Matrix of zeros and ones, rows distributed as the displacement space, columns the unknowns
+        (the caller destroys it).
+
+    Raises:
+        SceneError: On every rank: tied sides whose nodes do not match, a roller that is not
+            parallel to an axis, or nothing left to solve for.
+    """
+    kinds = {"base": "rigid", **boundary}
+    V = domain.V
+    size = V.dofmap.index_map.size_local
+    held = np.zeros((size + V.dofmap.index_map.num_ghosts, domain.gdim), bool)
+    for name, kind in kinds.items():
+        if kind in ("rigid", "fixed"):
+            held[_nodes(domain, name)] = True
+        elif kind == "roller":
+            held[_nodes(domain, name), _normal_axis(domain, name)] = True
+    held = held[:size]
+    image = _tied_nodes(domain, kinds)
+    _share_holds(domain, held, image)
+    return _assemble(V, held, image)
+
+
+def _nodes(domain: Domain, name: str) -> npt.NDArray[np.int32]:
+    """Local nodes (owned and ghost) of a boundary."""
+    facets = domain.boundaries.get(name, np.empty(0, np.int32))
+    return locate_dofs_topological(domain.V, domain.mesh.topology.dim - 1, facets)
+
+
+def _normal_axis(domain: Domain, name: str) -> int:
+    """Axis normal to a plane boundary."""
+    places = domain.V.tabulate_dof_coordinates()[_nodes(domain, name), : domain.gdim]
+    everyone = np.concatenate(domain.comm.allgather(places))
+    extent = np.ptp(everyone, axis=0)
+    axis = int(np.argmin(extent))
+    if extent[axis] > 1e-9 * extent.max():
+        expected = "a vertical or horizontal side under a roller, or 'fixed', or 'free'"
+        raise SceneError([Fault(f"boundary.{name}", "a side that is not parallel to an axis", expected)])
+    return axis
+
+
+def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
+    """Global node of each tied node's last partner, the same on every rank."""
+    V, gdim = domain.V, domain.gdim
+    size = V.dofmap.index_map.size_local
+    image: dict[int, int] = {}
+    for low, high, axis in _TIED:
+        if not kinds.get(low) == kinds.get(high) == "tied":
+            continue
+        sides = []
+        for name in (low, high):
+            nodes = _nodes(domain, name)
+            nodes = nodes[nodes < size]
+            numbers = V.dofmap.index_map.local_to_global(nodes)
+            places = V.tabulate_dof_coordinates()[nodes, :gdim]
+            sides.append([np.concatenate(part) for part in
+                          zip(*domain.comm.allgather((numbers, places)), strict=True)])
+        (low_number, low_place), (high_number, high_place) = sides
+        across = [a for a in range(gdim) if a != axis]
+        _, partner, far = _match(low_place[:, across], high_place[:, across])
+        if len(low_number) != len(high_number) or len(far):
+            place = high_place[far[0]].tolist() if len(far) else "none in particular"
+            found = (
+                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(far)} of them "
+                f"without a partner (the first at {place})"
+            )
+            expected = "the same nodes on both tied sides: mesh them alike"
+            raise SceneError([Fault(f"boundary.{high}", found, expected)])
+        image.update(zip(high_number.tolist(), low_number[partner].tolist(), strict=True))
+    for node, target in image.items():
+        while target in image:  # an edge between two tied pairs
+            target = image[target]
+        image[node] = target
+    return image
+
+
+def _match(
+    low: npt.NDArray[np.float64], high: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """Nearest node of the low side for each of the high side, and those that have none."""
+    if not len(low) or not len(high):
+        return np.empty(0), np.empty(0, np.int64), np.arange(len(high))
+    distance, partner = KDTree(low).query(high)
+    tolerance = 1e-8 * max(float(np.ptp(low, axis=0).max()), np.finfo(float).tiny)
+    return distance, partner, np.flatnonzero(distance > tolerance)
+
+
+def _share_holds(domain: Domain, held: npt.NDArray[np.bool_], image: dict[int, int]) -> None:
+    """Where one node of a tied family is held, hold them all."""
+    if not image:
+        return
+    first = domain.V.dofmap.index_map.local_range[0]
+    family = np.array(sorted(set(image) | set(image.values())), np.int64)
+    mine = family[(family >= first) & (family < first + len(held))]
+    flags = {}
+    for numbers, part in domain.comm.allgather((mine, held[mine - first])):
+        for number, flag in zip(numbers.tolist(), part, strict=True):
+            root = image.get(number, number)
+            flags[root] = flags.get(root, False) | flag
+    for number in mine.tolist():
+        held[number - first] |= flags[image.get(number, number)]
+
+
+def _assemble(V: FunctionSpace, held: npt.NDArray[np.bool_], image: dict[int, int]) -> PETSc.Mat:
+    comm = V.mesh.comm
+    num_nodes, gdim = held.shape
+    first = V.dofmap.index_map.local_range[0]
+    node = np.arange(first, first + num_nodes)
+    slave = np.isin(node, np.fromiter(image, np.int64, len(image)))
+    free = ~held & ~slave[:, None]
+    offset = comm.exscan(int(free.sum())) or 0
+    if comm.allreduce(int(free.sum())) == 0:
+        raise SceneError([Fault("boundary", "every displacement held", "some that are free")])
+    unknown = np.full(held.shape, -1, np.int64)
+    unknown[free] = offset + np.arange(free.sum())
+    roots = np.array(sorted(set(image.values())), np.int64)
+    mine = roots[(roots >= first) & (roots < first + num_nodes)]
+    numbers: dict[int, npt.NDArray[np.int64]] = {}
+    for part in comm.allgather(dict(zip(mine.tolist(), unknown[mine - first], strict=True))):
+        numbers.update(part)
+    for number in node[slave].tolist():
+        unknown[number - first] = numbers[image[number]]
+    column = unknown.ravel()
+    filled = column >= 0
+    indptr = np.concatenate([[0], np.cumsum(filled)]).astype(PETSc.IntType)
+    T = PETSc.Mat().createAIJ(
+        ((held.size, None), (int(free.sum()), None)),
+        csr=(indptr, column[filled].astype(PETSc.IntType), np.ones(filled.sum(), PETSc.ScalarType)),
+        comm=comm,
+    )
+    T.assemble()
+    return T

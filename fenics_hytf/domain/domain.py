@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""The domain: a distributed mesh with named regions and boundaries, and its displacement space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import basix.ufl
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import FunctionSpace, functionspace
+from dolfinx.mesh import Mesh, create_mesh, locate_entities_boundary
+from mpi4py import MPI
+
+from fenics_hytf import _compat
+from fenics_hytf.domain.checks import refuse_inverted_cells
+from fenics_hytf.domain.files import read_mesh
+from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
+from fenics_hytf.scene import Fault, Scene, SceneError
+
+
+@dataclass(frozen=True)
+class Domain:
+    """A mesh and what is named on it.
+
+    Attributes:
+        mesh: Distributed mesh; ranks see the cells across their facets as ghosts.
+        V: Continuous vector-valued Lagrange space of the displacement.
+        region_names: Names of the regions, which are names of soils.
+        regions: Region of each local cell, ghosts included, shape ``(num_local_cells,)``.
+        boundaries: Local exterior facets by the name of the boundary.
+    """
+
+    mesh: Mesh
+    V: FunctionSpace
+    region_names: tuple[str, ...]
+    regions: npt.NDArray[np.int32]
+    boundaries: dict[str, npt.NDArray[np.int32]]
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator of the mesh."""
+        return self.mesh.comm
+
+    @property
+    def gdim(self) -> int:
+        """Space dimension."""
+        return self.mesh.geometry.dim
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the displacement components."""
+        return ("x", "y", "z")[: self.gdim]
+
+    @property
+    def num_owned_cells(self) -> int:
+        """Cells this rank owns; they come first among the local ones."""
+        return self.mesh.topology.index_map(self.mesh.topology.dim).size_local
+
+    @property
+    def num_cells(self) -> int:
+        """Cells of the whole mesh."""
+        return self.mesh.topology.index_map(self.mesh.topology.dim).size_global
+
+    @property
+    def input_cells(self) -> npt.NDArray[np.int64]:
+        """Input number of each local cell, ghosts included, shape ``(num_local_cells,)``."""
+        return np.asarray(self.mesh.topology.original_cell_index, np.int64)
+
+    def gather_cells(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Bring values of owned cells into the order of the input, on every rank.
+
+        Args:
+            values: Shape ``(num_owned_cells, ...)``; more rows (ghosts) are ignored.
+
+        Returns:
+            Shape ``(num_cells, ...)``.
+        """
+        owned = self.num_owned_cells
+        parts = self.comm.allgather((self.input_cells[:owned], values[:owned]))
+        everything = np.empty((self.num_cells, *values.shape[1:]), values.dtype)
+        for cells, part in parts:
+            everything[cells] = part
+        return everything
+
+
+def build(scene: Scene, comm: MPI.Comm) -> Domain:
+    """Make the scene's mesh and space.
+
+    Args:
+        scene: The scene.
+        comm: Communicator; the mesh is read or made on rank 0 and distributed.
+
+    Returns:
+        The domain.
+
+    Raises:
+        SceneError: On every rank: an unreadable file, a region without a soil of its name, a
+            boundary that the scene names and the mesh lacks, or a cell with a non-positive
+            Jacobian.
+    """
+    data = _on_rank_zero(comm, lambda: _mesh_data(scene))
+    mesh = _distribute(data, comm)
+    refuse_inverted_cells(mesh)
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    element = basix.ufl.element(
+        "Lagrange", mesh.basix_cell(), scene.mesh.degree, shape=(mesh.geometry.dim,)
+    )
+    header = (data.region_names, data.region) if data else None
+    names, region = comm.bcast(header)
+    local = region[np.asarray(mesh.topology.original_cell_index, np.int64)]
+    return Domain(mesh, functionspace(mesh, element), names, local, _boundaries(mesh, data, comm))
+
+
+def _on_rank_zero(comm: MPI.Comm, make: Callable[[], MeshData]) -> MeshData | None:
+    """Run on rank 0 only and raise its faults on every rank."""
+    data, faults = None, None
+    if comm.rank == 0:
+        try:
+            data = make()
+        except SceneError as error:
+            faults = error.faults
+    faults = comm.bcast(faults)
+    if faults:
+        raise SceneError(faults)
+    return data
+
+
+def _mesh_data(scene: Scene) -> MeshData:
+    soils = tuple(scene.soil)
+    if scene.mesh.column is not None:
+        return column_mesh(scene.mesh.column)
+    if scene.mesh.box is not None:
+        return box_mesh(scene.mesh.box, scene.mesh, soils)
+    data = read_mesh(scene.mesh.file, soils)
+    faults = []
+    missing = [name for name in data.region_names if name not in soils]
+    if missing:
+        faults.append(Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each"))
+    known = ", ".join(data.facets) or "physical groups of facets (the mesh has none)"
+    for name in scene.boundary:
+        if name not in data.facets:
+            faults.append(Fault(f"boundary.{name}", "no such boundary in the mesh", known))
+    if "base" not in data.facets and not {"rigid", "fixed"} & set(scene.boundary.values()):
+        expected = "a boundary named 'base', or one that the scene calls rigid"
+        faults.append(Fault("boundary", f"none that is held among {known}", expected))
+    if scene.mesh.kinematics and data.points.shape[1] == 3:
+        faults.append(Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh"))
+    if faults:
+        raise SceneError(faults)
+    return data
+
+
+def _distribute(data: MeshData | None, comm: MPI.Comm) -> Mesh:
+    shape = (data.cell_type, data.degree, data.points.shape[1], data.cells.shape[1]) if data else None
+    cell_type, degree, gdim, width = comm.bcast(shape)
+    cells = data.cells if data else np.empty((0, width), np.int64)
+    points = data.points if data else np.empty((0, gdim))
+    element = basix.ufl.element("Lagrange", cell_type, degree, shape=(gdim,))
+    return create_mesh(comm, cells, points, element, _compat.shared_facet_partitioner())
+
+
+def _boundaries(
+    mesh: Mesh, data: MeshData | None, comm: MPI.Comm
+) -> dict[str, npt.NDArray[np.int32]]:
+    """Local exterior facets of each named boundary."""
+    fdim = mesh.topology.dim - 1
+    mesh.topology.create_entities(fdim)
+    planes, facets = comm.bcast((data.planes, tuple(data.facets)) if data else None)
+    found: dict[str, npt.NDArray[np.int32]] = {}
+    size = comm.allreduce(float(np.abs(mesh.geometry.x).max(initial=0.0)), MPI.MAX)
+    for name, (axis, place) in planes.items():
+        on_plane = lambda x, a=axis, p=place: np.abs(x[a] - p) <= 1e-12 * size  # noqa: E731
+        found[name] = locate_entities_boundary(mesh, fdim, on_plane)
+    for name in facets:
+        nodes = data.facets[name] if data else np.empty((0, 0), np.int64)
+        width = comm.bcast(nodes.shape[1])
+        found[name] = _compat.find_entities(mesh, fdim, nodes.reshape(-1, width))
+    return found

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: MIT
+"""Structured meshes as plain arrays: the layered column and the box.
+
+A mesh travels as :class:`MeshData` from here, or from a file, to the one place that hands it to
+dolfinx. Cells and their numbers in it are the *input cells* that results and messages speak of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.scene import Box, Column, Fault, Mesh, SceneError
+
+# Corners of a unit square or cube by their number in tensor order (x fastest), and its division
+# into simplices of positive orientation (the cube's is Kuhn's: six tetrahedra round a diagonal).
+_TRIANGLES = ((0, 1, 3), (0, 3, 2))
+_TETRAHEDRA = ((0, 1, 3, 7), (0, 1, 7, 5), (0, 5, 7, 4), (0, 3, 2, 7), (0, 6, 4, 7), (0, 2, 6, 7))
+
+
+@dataclass(frozen=True)
+class MeshData:
+    """A mesh as arrays.
+
+    Attributes:
+        points: Nodes [m], shape ``(num_nodes, gdim)``.
+        cells: Nodes of each cell in dolfinx's order, shape ``(num_cells, nodes_per_cell)``.
+        cell_type: ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``.
+        degree: Degree of the geometry, 1 or 2.
+        region: Index into ``region_names``, shape ``(num_cells,)``.
+        region_names: Names of the regions, which are names of soils.
+        planes: Boundaries that lie in a coordinate plane: name, axis and place [m].
+        facets: Boundaries given by facets: name and nodes, shape ``(num_facets, n)``, in dolfinx's
+            order of the facet's nodes.
+    """
+
+    points: npt.NDArray[np.float64]
+    cells: npt.NDArray[np.int64]
+    cell_type: str
+    degree: int
+    region: npt.NDArray[np.int32]
+    region_names: tuple[str, ...]
+    planes: dict[str, tuple[int, float]] = field(default_factory=dict)
+    facets: dict[str, npt.NDArray[np.int64]] = field(default_factory=dict)
+
+
+def column_mesh(column: Column) -> MeshData:
+    """Mesh a layered column, one cell wide, cells numbered from the top down.
+
+    Args:
+        column: Width [m] and layers, top down; the base is at y = 0.
+
+    Returns:
+        Quadrilaterals with the boundaries ``base``, ``top``, ``left`` and ``right``.
+    """
+    thickness = np.concatenate(
+        [np.full(layer.cells, layer.thickness / layer.cells) for layer in column.layers]
+    )
+    depth = np.concatenate([[0.0], np.cumsum(thickness)])
+    levels = column.height - depth[::-1]
+    levels[0] = 0.0
+    points, cells = _grid([np.array([0.0, column.width]), levels])
+    names = tuple(dict.fromkeys(layer.soil for layer in column.layers))
+    region = np.concatenate(
+        [np.full(layer.cells, names.index(layer.soil), np.int32) for layer in column.layers]
+    )
+    return MeshData(
+        points, cells[::-1].copy(), "quadrilateral", 1, region, names, _sides([column.width, column.height])
+    )
+
+
+def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
+    """Mesh a box with equal cells.
+
+    Args:
+        box: Size [m], number of cells along each axis, and cell type.
+        mesh: The section with the regions; without any, one soil fills the box.
+        soils: Names of the scene's soils.
+
+    Returns:
+        The mesh with the boundaries ``base``, ``top``, ``left``, ``right`` and in 3D ``front``,
+        ``back``.
+
+    Raises:
+        SceneError: A cell's centroid lies in no region.
+    """
+    axes = [np.linspace(0.0, size, n + 1) for size, n in zip(box.size, box.cells, strict=True)]
+    points, cells = _grid(axes)
+    if box.cell == "triangle":
+        cells = cells[:, np.array(_TRIANGLES)].reshape(-1, 3)
+    elif box.cell == "tetrahedron":
+        cells = cells[:, np.array(_TETRAHEDRA)].reshape(-1, 4)
+    region, names = _regions(points[cells].mean(axis=1), mesh, soils)
+    return MeshData(points, cells, box.cell, 1, region, names, _sides(box.size))
+
+
+def _sides(size: Sequence[float]) -> dict[str, tuple[int, float]]:
+    """Name the sides of a box with a corner in the origin; the last axis is up."""
+    up = len(size) - 1
+    sides = {"base": (up, 0.0), "top": (up, float(size[up]))}
+    for axis, (low, high) in zip(range(up), (("left", "right"), ("front", "back")), strict=False):
+        sides |= {low: (axis, 0.0), high: (axis, float(size[axis]))}
+    return sides
+
+
+def _grid(
+    axes: Sequence[npt.NDArray[np.float64]],
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Tensor grid, x fastest, cells in tensor order of their corners."""
+    mesh = np.meshgrid(*axes, indexing="ij")
+    points = np.stack([m.ravel(order="F") for m in mesh], axis=1)
+    counts = [len(axis) for axis in axes]
+    number = np.arange(len(points), dtype=np.int64).reshape(counts, order="F")
+    corners = []
+    for corner in range(2 ** len(axes)):
+        cut = tuple(
+            slice(1, None) if corner >> axis & 1 else slice(None, -1) for axis in range(len(axes))
+        )
+        corners.append(number[cut].ravel(order="F"))
+    return points, np.stack(corners, axis=1)
+
+
+def _regions(
+    centroids: npt.NDArray[np.float64], mesh: Mesh, soils: Sequence[str]
+) -> tuple[npt.NDArray[np.int32], tuple[str, ...]]:
+    owner = mesh.region_index(centroids)
+    bare = np.flatnonzero(owner < 0)
+    if len(bare):
+        found = f"{len(bare)} cells in no region, the first round {centroids[bare[0]].tolist()} m"
+        expected = "a region for every cell: add a last one without 'below' and 'polygon'"
+        raise SceneError([Fault("mesh.regions", found, expected)])
+    soil_of = [region.soil for region in mesh.regions] or [soils[0]]
+    names = tuple(dict.fromkeys(soil_of))
+    return np.array([names.index(soil) for soil in soil_of], np.int32)[owner], names

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: MIT
+"""Sweeps over frequencies of an affine complex symmetric system."""
+
+from fenics_hytf.frequency.direct import SymmetricFactorisation, direct_sweep
+from fenics_hytf.frequency.errors import FactorisationError, ResidualError, SweepError
+from fenics_hytf.frequency.sweep import DenseSweep, Sweep
+from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction, constant, hysteretic
+
+__all__ = [
+    "DenseSweep",
+    "DynamicSystem",
+    "FactorisationError",
+    "ResidualError",
+    "ScalarFunction",
+    "Sweep",
+    "SweepError",
+    "SymmetricFactorisation",
+    "constant",
+    "direct_sweep",
+    "hysteretic",
+]

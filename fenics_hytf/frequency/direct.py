@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: MIT
+"""The direct sweep: one factorisation a frequency, the reference for every other sweep.
+
+MUMPS LDLᵀ of the complex symmetric A(s), one matrix kept and refilled (METHOD, section 3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fenics_hytf.frequency.errors import FactorisationError, ResidualError
+from fenics_hytf.frequency.sweep import DenseSweep
+from fenics_hytf.frequency.system import DynamicSystem
+
+_PREFIX = "hytf_direct_"
+
+
+class SymmetricFactorisation:
+    """LDLᵀ of one system, refilled from frequency to frequency.
+
+    Args:
+        system: The system.
+
+    A context manager: it owns a matrix and a factorisation and destroys them at its end.
+    """
+
+    def __init__(self, system: DynamicSystem) -> None:
+        self._system = system
+        self.factorisations = 0
+        self.A = system.create_matrix()
+        self._residual = self.A.createVecLeft()
+        self._correction = self.A.createVecRight()
+        self._pivoting = False
+        self._solver = self._create_solver()
+
+    def __enter__(self) -> SymmetricFactorisation:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for owned in (self._solver, self._residual, self._correction, self.A):
+            owned.destroy()
+
+    def _create_solver(self) -> PETSc.KSP:
+        solver = PETSc.KSP().create(self.A.comm)
+        solver.setOptionsPrefix(_PREFIX)
+        solver.setType(PETSc.KSP.Type.PREONLY)
+        solver.setErrorIfNotConverged(True)
+        pc = solver.getPC()
+        pc.setType(PETSc.PC.Type.CHOLESKY)
+        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        return solver
+
+    def factorise(self, s: complex) -> None:
+        """Fill A(s) and factorise it.
+
+        Args:
+            s: Complex frequency η + iω [rad/s].
+
+        Raises:
+            FactorisationError: A(s) is singular, or MUMPS failed otherwise.
+        """
+        self._system.fill(self.A, s)
+        self._s = s
+        self._factorise()
+
+    def _factorise(self) -> None:
+        solver = self._solver
+        # Without setOperators the refactorisation silently does not happen.
+        solver.setOperators(self.A)
+        pc = solver.getPC()
+        pc.setFactorSetUpSolverType()
+        factor = pc.getFactorMatrix()
+        factor.setMumpsIcntl(7, 4)  # PORD: the default ordering is worse than LU's in 3D
+        factor.setMumpsIcntl(12, 1)  # no compressed ordering of symmetric indefinite matrices
+        factor.setMumpsIcntl(6, 0)  # no column permutation
+        factor.setMumpsCntl(1, 0.01 if self._pivoting else 0.0)
+        try:
+            solver.setUp()
+        except PETSc.Error as error:
+            raise FactorisationError(self._s, factor.getMumpsInfog(1)) from error
+        if factor.getMumpsInfog(1) < 0:
+            raise FactorisationError(self._s, factor.getMumpsInfog(1))
+        self.factorisations += 1
+
+    def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> float:
+        """Solve A x = b and return the true relative residual.
+
+        Where the residual exceeds the tolerance the solution is refined once, then the matrix is
+        factorised again with pivoting.
+
+        Args:
+            b: Right-hand side.
+            x: Solution, overwritten.
+            tolerance: Wanted relative residual [-].
+
+        Returns:
+            ``|b − A x| / |b|``.
+
+        Raises:
+            ResidualError: The residual stays above the tolerance.
+        """
+        scale = b.norm()
+        if scale == 0.0:
+            x.zeroEntries()
+            return 0.0
+        self._solver.solve(b, x)
+        residual = self._true_residual(b, x) / scale
+        if residual > tolerance:
+            residual = self._refine(b, x) / scale
+        if not residual <= tolerance and not self._pivoting:
+            self._pivoting = True
+            self._factorise()
+            return self.solve(b, x, tolerance)
+        if not residual <= tolerance:
+            raise ResidualError(self._s, residual, tolerance)
+        return residual
+
+    def _true_residual(self, b: PETSc.Vec, x: PETSc.Vec) -> float:
+        self.A.mult(x, self._residual)
+        self._residual.aypx(-1.0, b)
+        return self._residual.norm()
+
+    def _refine(self, b: PETSc.Vec, x: PETSc.Vec) -> float:
+        self._solver.solve(self._residual, self._correction)
+        x.axpy(1.0, self._correction)
+        return self._true_residual(b, x)
+
+
+def direct_sweep(
+    system: DynamicSystem,
+    b: PETSc.Vec | Sequence[PETSc.Vec],
+    s: npt.ArrayLike,
+    tolerance: float = 1e-6,
+    progress: Callable[[int, int], None] | None = None,
+) -> DenseSweep:
+    """Solve A(s) x = b at every frequency by factorisation.
+
+    Args:
+        system: The system.
+        b: Right-hand side, or several.
+        s: Complex frequencies η + iω [rad/s], shape ``(num_lines,)``.
+        tolerance: Relative residual that every solve must reach [-].
+        progress: Called with the lines done and their number.
+
+    Returns:
+        The solutions, residuals and counts.
+
+    Raises:
+        FactorisationError: A(s) is singular at a line, as at an undamped resonance.
+        ResidualError: A residual stays above the tolerance.
+    """
+    sides = [b] if isinstance(b, PETSc.Vec) else list(b)
+    lines = np.atleast_1d(np.asarray(s, np.complex128))
+    num_local = sides[0].getLocalSize()
+    # One unknown a row of memory: each solution is a column, contiguous for PETSc.
+    values = np.empty((num_local, len(lines) * len(sides)), np.complex128, order="F")
+    residuals = np.empty((len(lines), len(sides)))
+    column = PETSc.Vec().createWithArray(
+        np.empty(num_local, np.complex128), size=sides[0].getSizes(), comm=system.comm
+    )
+    with SymmetricFactorisation(system) as factorisation:
+        for line, frequency in enumerate(lines):
+            factorisation.factorise(complex(frequency))
+            for side, right in enumerate(sides):
+                column.placeArray(values[:, line * len(sides) + side])
+                residuals[line, side] = factorisation.solve(right, column, tolerance)
+                column.resetArray()
+            if progress is not None:
+                progress(line + 1, len(lines))
+        count = factorisation.factorisations
+    column.destroy()
+    return DenseSweep(system.comm, lines, values, residuals, count, residuals.size)

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: MIT
+"""What can go wrong in a sweep."""
+
+from __future__ import annotations
+
+import math
+
+
+class SweepError(RuntimeError):
+    """A line of the sweep could not be solved.
+
+    Attributes:
+        s: Complex frequency of the line [rad/s].
+    """
+
+    def __init__(self, s: complex, message: str) -> None:
+        self.s = s
+        super().__init__(f"at {s.imag / (2 * math.pi):.6g} Hz (s = {s:.6g} rad/s): {message}")
+
+
+class FactorisationError(SweepError):
+    """The matrix of a line is singular, or the factorisation failed otherwise."""
+
+    def __init__(self, s: complex, infog: int) -> None:
+        super().__init__(
+            s,
+            f"found a matrix that MUMPS cannot factorise (INFOG(1) = {infog}); expected a regular "
+            "one: an undamped resonance needs damping, and every part of the mesh a support",
+        )
+
+
+class ResidualError(SweepError):
+    """The solution of a line does not satisfy its equations."""
+
+    def __init__(self, s: complex, residual: float, tolerance: float) -> None:
+        super().__init__(
+            s,
+            f"found a relative residual of {residual:.3g}; expected at most {tolerance:.3g}: the "
+            "line may be an undamped resonance; add damping or loosen solver.tolerance",
+        )

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""What every sweep gives: solutions, projections of them, residuals and counts."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+class Sweep(Protocol):
+    """A solved sweep over frequencies.
+
+    Attributes:
+        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+        residuals: True relative residuals [-], shape ``(num_lines, num_sides)``.
+        factorisations: Matrices factorised.
+        solves: Solves with them.
+    """
+
+    s: ComplexArray
+    residuals: npt.NDArray[np.float64]
+    factorisations: int
+    solves: int
+
+    def solution(self, k: int) -> ComplexArray:
+        """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
+
+    def project(self, rows: PETSc.Mat) -> ComplexArray:
+        """Multiply every solution by a matrix.
+
+        Args:
+            rows: Matrix with as many columns as there are unknowns.
+
+        Returns:
+            This rank's rows, shape ``(num_local_rows, num_sides, num_lines)``.
+        """
+
+    def combine(self, weights: ComplexArray) -> ComplexArray:
+        """Sum all solutions with weights.
+
+        Args:
+            weights: Shape ``(num_sides, num_lines)``.
+
+        Returns:
+            Shape ``(num_local,)``.
+        """
+
+
+class DenseSweep:
+    """A sweep that holds every solution.
+
+    Args:
+        comm: Communicator.
+        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+        values: This rank's part of the solutions, a column each, all sides of a line together,
+            shape ``(num_local, num_lines·num_sides)``, Fortran order.
+        residuals: Shape ``(num_lines, num_sides)``.
+        factorisations: Matrices factorised.
+        solves: Solves.
+    """
+
+    def __init__(
+        self,
+        comm: PETSc.Comm,
+        s: ComplexArray,
+        values: ComplexArray,
+        residuals: npt.NDArray[np.float64],
+        factorisations: int,
+        solves: int,
+    ) -> None:
+        self.s = s
+        self.residuals = residuals
+        self.factorisations = factorisations
+        self.solves = solves
+        self._comm = comm
+        self._values = values
+        self._sides = residuals.shape[1]
+
+    def solution(self, k: int) -> ComplexArray:
+        """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
+        return self._values[:, k * self._sides : (k + 1) * self._sides]
+
+    def project(self, rows: PETSc.Mat) -> ComplexArray:
+        """Multiply every solution by a matrix; see :class:`Sweep`."""
+        num_local, count = self._values.shape
+        shape = (rows.getLocalSize()[0], len(self.s), self._sides)
+        if count == 0:
+            return np.empty((shape[0], shape[2], 0), np.complex128)
+        everything = PETSc.Mat().createDense(
+            ((num_local, None), (None, count)), array=self._values, comm=self._comm
+        )
+        product = rows.matMult(everything)
+        result = product.getDenseArray().reshape(shape).transpose(0, 2, 1).copy()
+        product.destroy()
+        everything.destroy()
+        return result
+
+    def combine(self, weights: ComplexArray) -> ComplexArray:
+        """Sum all solutions with weights; see :class:`Sweep`."""
+        return self._values @ np.ascontiguousarray(weights.T).ravel()

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: MIT
+"""The dynamic stiffness A(s) = sum_j f_j(s) K_j + s C + s² M as an affine sum of matrices.
+
+A law of material damping is a scalar function of the complex frequency s = η + iω beside a real
+matrix: hysteretic damping is ``(K_imag, hysteretic)``, viscous branches are rational functions, and
+nothing else in this room changes. All matrices are complex *symmetric* (A = Aᵀ), never Hermitian.
+The paper's transfer function (5) h(ω) = [ω²M − K*]⁻¹ M r is the solution of A(iω) h = −M r.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from petsc4py import PETSc
+
+ScalarFunction = Callable[[complex], complex]
+
+
+def constant(s: complex) -> complex:
+    """The function 1, of an elastic stiffness."""
+    return 1.0
+
+
+def hysteretic(s: complex) -> complex:
+    """i·sign(ω), of the imaginary part of a hysteretic stiffness; 0 on the real axis."""
+    return 1j * float(np.sign(s.imag))
+
+
+class DynamicSystem:
+    """A(s) as an affine sum of matrices times scalar functions of s.
+
+    Args:
+        K: One matrix, or a sequence of ``(matrix, function of s)``.
+        M: Mass matrix [kg].
+        C: Damping matrix [N s/m], or ``None``.
+
+    The matrices are borrowed: whoever made them destroys them. They share one sparsity pattern, so
+    that their sum is a flat loop over the values.
+
+    Raises:
+        ValueError: The matrices differ in size or pattern.
+    """
+
+    def __init__(
+        self,
+        K: PETSc.Mat | Sequence[tuple[PETSc.Mat, ScalarFunction]],
+        M: PETSc.Mat,
+        C: PETSc.Mat | None = None,
+    ) -> None:
+        stiffness = [(K, constant)] if isinstance(K, PETSc.Mat) else list(K)
+        if not stiffness:
+            raise ValueError("K: found no matrix; expected at least one")
+        self.terms: list[tuple[PETSc.Mat, ScalarFunction]] = [
+            *stiffness,
+            (M, lambda s: s * s),
+            *([(C, lambda s: s)] if C is not None else []),
+        ]
+        self._require_one_pattern()
+
+    def _require_one_pattern(self) -> None:
+        first = self.terms[0][0]
+        used = first.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"]
+        # PETSc adds matrices declared of one pattern without looking: unequal ones corrupt the sum.
+        same = all(
+            matrix.getSizes() == first.getSizes()
+            and matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"] == used
+            for matrix, _ in self.terms
+        )
+        if not first.comm.tompi4py().allreduce(int(same)) == first.comm.size:
+            raise ValueError(
+                "K, M, C: found matrices of different sizes or sparsity patterns; expected one "
+                "pattern: assemble M and C into zeroed copies of K"
+            )
+
+    @property
+    def comm(self) -> PETSc.Comm:
+        """Communicator of the matrices."""
+        return self.terms[0][0].comm
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Return a matrix that :meth:`fill` can fill; the caller destroys it."""
+        matrix = self.terms[0][0].duplicate(copy=False)
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        return matrix
+
+    def fill(self, A: PETSc.Mat, s: complex) -> None:
+        """Write A(s) into a matrix made by :meth:`create_matrix`.
+
+        Args:
+            A: The matrix.
+            s: Complex frequency η + iω [rad/s].
+        """
+        same = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
+        first, function = self.terms[0]
+        first.copy(A, structure=same)
+        A.scale(function(s))
+        for matrix, function in self.terms[1:]:
+            factor = function(s)
+            if factor != 0:
+                A.axpy(factor, matrix, structure=same)

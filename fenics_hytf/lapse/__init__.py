@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: MIT
+"""One lapse: the ground, its equations, the equivalent-linear loop, the response, convection."""
+
+from fenics_hytf.lapse.convective import cell_stress, convect
+from fenics_hytf.lapse.equations import Equations, LapseEquations
+from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
+from fenics_hytf.lapse.errors import EmptyCellError, EquivalentLinearError, LapseError
+from fenics_hytf.lapse.ground import (
+    ElasticConstants,
+    Ground,
+    Moduli,
+    complex_constants,
+    survey,
+)
+from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
+from fenics_hytf.lapse.response import (
+    CellPeaks,
+    CellProbe,
+    Excitation,
+    Histories,
+    ReceiverProbe,
+)
+from fenics_hytf.lapse.run import Observer, Solved, excite, solve
+from fenics_hytf.lapse.strain import shear_strain
+
+__all__ = [
+    "Anderson",
+    "CellPeaks",
+    "CellProbe",
+    "CellState",
+    "ElasticConstants",
+    "EmptyCellError",
+    "Equations",
+    "EquivalentLinearError",
+    "Excitation",
+    "Ground",
+    "Histories",
+    "LapseEquations",
+    "LapseError",
+    "LapseResult",
+    "LoopHistory",
+    "Moduli",
+    "Observer",
+    "ReceiverProbe",
+    "Solved",
+    "cell_stress",
+    "complex_constants",
+    "convect",
+    "excite",
+    "first_strain",
+    "iterate",
+    "shear_strain",
+    "solve",
+    "survey",
+]

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""The convective phase between lapses (METHOD, section 5): points move, are found again, carry on.
+
+Points take the increment Δu = S(u(t_end) − u(t_start)) of the lapse with its gradient; the mesh
+stays where it was. Under ``steady`` continuity a lapse is periodic and the net increment is zero.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.lapse.ground import ElasticConstants
+from fenics_hytf.particles import (
+    MoveReport,
+    Points,
+    gradient_matrices,
+    move,
+    to_tensor,
+    transfer_matrix,
+    update_kinematics,
+)
+
+RealArray = npt.NDArray[np.float64]
+
+
+def convect(
+    domain: Domain,
+    points: Points,
+    increment: RealArray,
+    outside: Literal["error", "park", "delete"] = "error",
+    constants: ElasticConstants | None = None,
+    velocity: RealArray | None = None,
+    acceleration: RealArray | None = None,
+) -> MoveReport:
+    """Move the points with the nodes' increment and find them again (collective).
+
+    Args:
+        domain: The domain.
+        points: The points, changed in place.
+        increment: Displacement increment of the lapse at the local nodes, ghosts included [m],
+            shape ``(num_local_nodes, gdim)``.
+        outside: What happens to a point that leaves the mesh.
+        constants: Elastic constants of every cell in the order of the input, for points that carry
+            stress.
+        velocity: At the nodes at the end of the lapse [m/s], for points that carry it.
+        acceleration: Likewise [m/s^2].
+
+    Returns:
+        The mass ledger, and how many points were mapped.
+
+    Raises:
+        PointsOutside: A point left the mesh and ``outside`` is ``error``; on every rank, the points
+            unmoved.
+        PointsNotFinite: The increment is not finite.
+    """
+    S = transfer_matrix(points, domain.V)
+    gradient = np.stack([dS @ increment for dS in gradient_matrices(points, domain.V)], axis=2)
+    for name, field in (("velocity", velocity), ("acceleration", acceleration)):
+        if field is not None and name in points.history:
+            points[name] = S @ field
+    moduli = {}
+    if constants is not None and "stress" in points.history:
+        cells = domain.input_cells[points.cell]
+        moduli = {
+            "lame_lambda": constants.lame_lambda[cells],
+            "shear_modulus": constants.shear_modulus[cells],
+        }
+    displacement = S @ increment
+    if np.isfinite(gradient).all():
+        update_kinematics(points, gradient, **moduli)
+    return move(domain.mesh, points, displacement, outside)
+
+
+def cell_stress(domain: Domain, points: Points) -> RealArray:
+    """Stress of each local cell, the mean over its points by volume.
+
+    Args:
+        domain: The domain.
+        points: Points that carry stress.
+
+    Returns:
+        Cauchy stress [Pa], ghosts included, shape ``(num_local_cells, gdim, gdim)``.
+    """
+    weighted = np.column_stack([points.volume, points.volume[:, None] * points["stress"]])
+    sums = np.zeros((domain.num_owned_cells, weighted.shape[1]))
+    np.add.at(sums, points.cell, weighted)
+    everyone = domain.gather_cells(sums)[domain.input_cells]
+    return to_tensor(everyone[:, 1:] / everyone[:, :1])

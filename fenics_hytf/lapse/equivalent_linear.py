@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""The equivalent-linear loop: the shear modulus and damping of every cell fit its effective strain.
+
+γ_eff = ratio × max_t γ(t) → curves → G, D → sweep → γ_eff ... (Seed & Idriss 1969; METHOD, section
+4), accelerated as a fixed point in ln γ_eff (Anderson 1965; Walker & Ni 2011).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.lapse.errors import EquivalentLinearError
+from fenics_hytf.lapse.ground import Ground, Moduli
+from fenics_hytf.lapse.records import LoopHistory
+from fenics_hytf.scene import EquivalentLinear
+
+RealArray = npt.NDArray[np.float64]
+
+_PICARD = 0.05  # plain iteration until the moduli change by less: far away, it is the safer one
+_MEMORY = 5
+_LONGEST_STEP = 1.0  # in ln γ_eff: an accelerated step is not trusted further
+_SMALLEST_STRAIN = 1e-12  # below every curve; keeps the logarithm finite where nothing moves
+
+
+class Anderson:
+    """Anderson acceleration of a fixed point x = g(x).
+
+    Args:
+        memory: Differences of earlier steps that are kept.
+    """
+
+    def __init__(self, memory: int = _MEMORY) -> None:
+        self._points: deque[tuple[RealArray, RealArray]] = deque(maxlen=memory + 1)
+
+    def next(self, x: RealArray, g: RealArray) -> RealArray:
+        """Propose the next point.
+
+        Args:
+            x: Point, shape ``(n,)``.
+            g: Its image, shape ``(n,)``.
+
+        Returns:
+            The next point, shape ``(n,)``; the image itself at the first call.
+        """
+        self._points.append((x, g))
+        if len(self._points) == 1:
+            return g
+        xs = np.array([point for point, _ in self._points])
+        gs = np.array([image for _, image in self._points])
+        defects = gs - xs
+        # Differences below round-off of the largest one carry no information.
+        weights, *_ = np.linalg.lstsq(np.diff(defects, axis=0).T, defects[-1], rcond=1e-10)
+        proposal = g - np.diff(gs, axis=0).T @ weights
+        return x + np.clip(proposal - x, -_LONGEST_STEP, _LONGEST_STEP)
+
+
+def iterate(
+    ground: Ground,
+    settings: EquivalentLinear,
+    start: RealArray,
+    peak_strain: Callable[[Moduli, int], RealArray],
+    report: Callable[[int, float], None],
+    strain_from: npt.NDArray[np.intp] | None = None,
+) -> tuple[Moduli, RealArray, LoopHistory]:
+    """Iterate until G and D of every cell change by less than the tolerance.
+
+    Args:
+        ground: The ground.
+        settings: Tolerance, strain ratio and limit.
+        start: First effective strain of every cell [-], shape ``(num_cells,)``.
+        peak_strain: Solves with given moduli; called with them and the iteration (from 1), returns
+            the peak strain of every cell [-], shape ``(num_cells,)``.
+        report: Called with the iteration and its change.
+        strain_from: For every cell the cell whose strain rules its moduli; itself if ``None``.
+
+    Returns:
+        The moduli that the last response was solved with, the effective strain of that response,
+        and the history.
+
+    Raises:
+        EquivalentLinearError: The limit is reached.
+    """
+    nonlinear = ground.nonlinear
+    changes: list[float] = []
+    worst: list[int] = []
+    accelerated = Anderson()
+    log_strain = np.log(np.maximum(start, _SMALLEST_STRAIN))
+    moduli = ground.secant(np.exp(log_strain))
+    for iteration in range(1, settings.max_iterations + 1):
+        effective = settings.strain_ratio * peak_strain(moduli, iteration)
+        if strain_from is not None:
+            effective = effective[strain_from]
+        image = np.log(np.maximum(effective, _SMALLEST_STRAIN))
+        change = np.where(nonlinear, ground.secant(effective).change(moduli), 0.0)
+        worst.append(int(np.argmax(change)))
+        changes.append(float(change[worst[-1]]))
+        report(iteration, changes[-1])
+        if changes[-1] <= settings.tolerance:
+            return moduli, effective, LoopHistory(tuple(changes), tuple(worst))
+        if changes[-1] > _PICARD:
+            accelerated, log_strain = Anderson(), image
+        else:
+            log_strain = np.where(nonlinear, accelerated.next(log_strain, image), image)
+        moduli = ground.secant(np.exp(log_strain))
+    raise EquivalentLinearError(
+        settings.max_iterations, changes[-1], settings.tolerance, worst[-1]
+    )
+
+
+def first_strain(ground: Ground, density: RealArray, velocity: float, ratio: float) -> RealArray:
+    """A first guess, ratio × PGV/Vs, of the effective strain.
+
+    Args:
+        ground: The ground.
+        density: Of every cell [kg/m^3], shape ``(num_cells,)``.
+        velocity: Peak velocity of the input [m/s].
+        ratio: Effective over peak strain [-].
+
+    Returns:
+        [-], shape ``(num_cells,)``.
+    """
+    return ratio * velocity / np.sqrt(ground.shear_modulus / density)

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""The ground of one lapse: what soil the points have brought into each cell, and its stiffness.
+
+A cell takes the mean of the small-strain constants of the points in it, by volume, and the curves of
+the soil that fills most of it. All arrays hold every cell of the mesh in the order of the input, so
+that a run on several ranks adds in the same order as a serial one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.lapse.errors import EmptyCellError
+from fenics_hytf.particles import Points
+from fenics_hytf.scene import Scene
+from fenics_hytf.soil import Curve, complex_factor
+
+RealArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Soil of every cell.
+
+    Attributes:
+        region: Soil that fills most of the cell, as an index into the region names.
+        shear_modulus: Small-strain G [Pa].
+        poisson: Poisson's ratio [-].
+        damping: Damping ratio without curves [-].
+        curves: Curves of each region, ``None`` for a linear soil, shape ``(num_regions,)``.
+
+    All but the last have the shape ``(num_cells,)``.
+    """
+
+    region: npt.NDArray[np.int32]
+    shear_modulus: RealArray
+    poisson: RealArray
+    damping: RealArray
+    curves: tuple[Curve | None, ...]
+
+    @property
+    def nonlinear(self) -> npt.NDArray[np.bool_]:
+        """Cells whose soil has curves, shape ``(num_cells,)``."""
+        return np.array([curve is not None for curve in self.curves])[self.region]
+
+    def secant(self, effective_strain: RealArray) -> Moduli:
+        """Read the curves.
+
+        Args:
+            effective_strain: Of every cell [-], shape ``(num_cells,)``.
+
+        Returns:
+            Secant modulus and damping of every cell.
+        """
+        ratio, damping = np.ones_like(self.shear_modulus), self.damping.copy()
+        for number, curve in enumerate(self.curves):
+            if curve is not None:
+                mine = self.region == number
+                ratio[mine], damping[mine] = curve.evaluate(effective_strain[mine])
+        return Moduli(ratio * self.shear_modulus, damping)
+
+
+@dataclass(frozen=True)
+class Moduli:
+    """Secant shear modulus [Pa] and damping ratio [-] of every cell, shape ``(num_cells,)``."""
+
+    shear_modulus: RealArray
+    damping: RealArray
+
+    def change(self, old: Moduli) -> RealArray:
+        """The larger relative change of G and D from ``old``, shape ``(num_cells,)``."""
+        tiny = np.finfo(float).tiny
+        modulus = np.abs(self.shear_modulus - old.shear_modulus) / self.shear_modulus
+        damping = np.abs(self.damping - old.damping) / np.maximum(self.damping, tiny)
+        return np.maximum(modulus, damping)
+
+
+@dataclass(frozen=True)
+class ElasticConstants:
+    """Lamé's λ and the shear modulus of every cell [Pa], shape ``(num_cells,)``."""
+
+    lame_lambda: RealArray
+    shear_modulus: RealArray
+
+
+def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
+    """See which soil the points have brought where.
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+        points: The points; every cell holds some.
+
+    Returns:
+        The ground, the same on every rank.
+
+    Raises:
+        EmptyCellError: A cell holds no point; on every rank.
+    """
+    soils = [scene.soil[name] for name in domain.region_names]
+    with_curves = scene.effects.equivalent_linear is not None
+    constants = np.array(
+        [[s.elastic.shear_modulus, s.elastic.poisson, s.damping_ratio(with_curves)] for s in soils]
+    )
+    owned = domain.num_owned_cells
+    share = np.zeros((owned, len(soils)))
+    np.add.at(share, (points.cell, points.region), points.volume)
+    share = domain.gather_cells(share)
+    volume = share.sum(axis=1)
+    if not volume.all():
+        raise EmptyCellError(np.flatnonzero(volume == 0).tolist())
+    # A cell of one soil takes its constants as they stand, free of round-off.
+    region = share.argmax(axis=1).astype(np.int32)
+    mean = np.where(
+        (share > 0).sum(axis=1)[:, None] == 1,
+        constants[region],
+        share @ constants / volume[:, None],
+    )
+    curves = tuple(s.curve if with_curves else None for s in soils)
+    return Ground(region, mean[:, 0], mean[:, 1], mean[:, 2], curves)
+
+
+def complex_constants(
+    ground: Ground, moduli: Moduli, convention: str, keep: str
+) -> tuple[ElasticConstants, ElasticConstants | None]:
+    """Real and imaginary parts of the elastic constants.
+
+    Args:
+        ground: The ground, for Poisson's ratio and the small-strain bulk modulus.
+        moduli: Secant modulus and damping.
+        convention: Name of the complex modulus (METHOD, section 1).
+        keep: ``"poisson"``: the whole elasticity tensor takes the factor G*/G and G/G_max;
+            ``"bulk"``: only its deviator does.
+
+    Returns:
+        Real parts; imaginary parts for ω > 0, or ``None`` without any damping.
+    """
+    G = moduli.shear_modulus * complex_factor(moduli.damping, convention)
+    nu = ground.poisson
+    if keep == "poisson":
+        lame = G * (2 * nu / (1 - 2 * nu))
+    else:
+        bulk = ground.shear_modulus * 2 * (1 + nu) / (3 * (1 - 2 * nu))
+        lame = bulk - 2 / 3 * G
+    real = ElasticConstants(lame.real, G.real)
+    if not np.any(G.imag):
+        return real, None
+    return real, ElasticConstants(lame.imag, G.imag)
+
+

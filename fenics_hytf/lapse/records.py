@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: MIT
+"""What a lapse leaves behind: plain records, the same on every rank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.particles import MassLedger
+
+RealArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class CellState:
+    """Cell values of one lapse, all cells of all ranks in the order of the input mesh.
+
+    Attributes:
+        region: Index into the mesh's region names, shape ``(num_cells,)``.
+        centroid: [m], shape ``(num_cells, gdim)``.
+        shear_modulus: Secant shear modulus G [Pa], shape ``(num_cells,)``.
+        g_over_gmax: G over its small-strain value [-], shape ``(num_cells,)``.
+        damping: Damping ratio D [-], shape ``(num_cells,)``.
+        effective_strain: Effective shear strain [-] (strain ratio times the peak where the
+            equivalent-linear loop runs, else the peak), shape ``(num_cells,)``.
+        peak_strain: Largest shear strain over the lapse [-], shape ``(num_cells,)``.
+        peak_stress: Largest shear stress over the lapse [Pa], shape ``(num_cells,)``.
+        peak_acceleration: Largest total acceleration at the cell centre, Euclidean norm of the
+            components [m/s^2], shape ``(num_cells,)``.
+    """
+
+    region: npt.NDArray[np.int32]
+    centroid: RealArray
+    shear_modulus: RealArray
+    g_over_gmax: RealArray
+    damping: RealArray
+    effective_strain: RealArray
+    peak_strain: RealArray
+    peak_stress: RealArray
+    peak_acceleration: RealArray
+
+
+@dataclass(frozen=True)
+class LoopHistory:
+    """How the equivalent-linear loop went.
+
+    Attributes:
+        change: Per iteration max over cells of ``|G_new - G_old|/G_new`` and ``|dD|/D`` [-].
+        worst_cell: Per iteration the input index of the cell that changed most.
+    """
+
+    change: tuple[float, ...] = ()
+    worst_cell: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class LapseResult:
+    """One lapse.
+
+    Attributes:
+        index: Number of the lapse, from 0.
+        start_time: Time of the first sample [s].
+        num_samples: Samples in the lapse.
+        dt: Time step [s].
+        excited_lines: Lines of the spectrum above the scene's threshold.
+        solved_lines: Lines solved (each counted once, whatever the number of iterations).
+        factorisations: Factorisations over all iterations.
+        solves: Solves over all iterations.
+        worst_residual: Largest relative true residual of the final sweep [-].
+        loop: History of the equivalent-linear loop; empty without it.
+        frequency: Solved lines [Hz], shape ``(solved_lines,)``.
+        transfer: Total acceleration over the input as given, shape
+            ``(num_receivers, gdim, num_motions, solved_lines)`` [-].
+        displacement: Relative to the base [m], shape ``(num_receivers, gdim, num_samples)``.
+        velocity: Relative [m/s], same shape.
+        acceleration: Relative [m/s^2], same shape.
+        total_acceleration: [m/s^2], same shape.
+        cells: Values of the cells.
+        ledger: Points and their mass after the lapse's convective phase.
+    """
+
+    index: int
+    start_time: float
+    num_samples: int
+    dt: float
+    excited_lines: int
+    solved_lines: int
+    factorisations: int
+    solves: int
+    worst_residual: float
+    loop: LoopHistory
+    frequency: RealArray
+    transfer: ComplexArray
+    displacement: RealArray
+    velocity: RealArray
+    acceleration: RealArray
+    total_acceleration: RealArray
+    cells: CellState
+    ledger: MassLedger

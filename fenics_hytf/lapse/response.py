@@ -1,0 +1,268 @@
+# SPDX-License-Identifier: MIT
+"""From transfer functions to histories: û(ω) = h(ω) ü̂_b(ω) (6), T(ω) = r − ω²h(ω), peaks of cells.
+
+Everything comes from projections of the sweep on rows, a block of cells at a time; a line that was
+not solved counts as zero in the response and in the base acceleration that is added to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.frequency import Sweep
+from fenics_hytf.lapse.strain import shear_strain
+from fenics_hytf.motion import to_time
+from fenics_hytf.operators import constrained_rows, displacement_rows, strain_rows
+from fenics_hytf.particles import (
+    Sites,
+    cell_centres,
+    gradient_matrices,
+    transfer_matrix,
+)
+
+RealArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+_BLOCK = 256  # cells whose histories are held at once
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """The input of one lapse at the lines that are solved.
+
+    Attributes:
+        lines: Numbers of the solved lines, shape ``(num_lines,)``.
+        weights: Fourier coefficients of the base acceleration [m/s^2], shape
+            ``(num_motions, num_lines)``.
+        axes: Component in which each motion acts.
+        num_samples: Samples of the lapse.
+        dt: Time step [s].
+        excited: Lines above the threshold.
+    """
+
+    lines: npt.NDArray[np.intp]
+    weights: ComplexArray
+    axes: tuple[int, ...]
+    num_samples: int
+    dt: float
+    excited: int
+
+    @property
+    def frequency(self) -> RealArray:
+        """Of the lines [Hz]."""
+        return self.lines / (self.num_samples * self.dt)
+
+    @property
+    def omega(self) -> RealArray:
+        """Circular frequency of the lines [rad/s]."""
+        return 2 * np.pi * self.frequency
+
+    def to_time(self, coefficients: ComplexArray) -> RealArray:
+        """Sum the lines at every sample.
+
+        Args:
+            coefficients: Shape ``(..., num_lines)``.
+
+        Returns:
+            Shape ``(..., num_samples)``.
+        """
+        spectrum = np.zeros((*coefficients.shape[:-1], self.num_samples // 2 + 1), complex)
+        spectrum[..., self.lines] = coefficients
+        return to_time(spectrum, self.num_samples)
+
+    def respond(self, projected: ComplexArray) -> ComplexArray:
+        """Spectra of the response to all motions together (6).
+
+        Args:
+            projected: Transfer functions h, shape ``(num_rows, num_motions, num_lines)``.
+
+        Returns:
+            Shape ``(num_rows, num_lines)``.
+        """
+        return np.einsum("rmk,mk->rk", projected, self.weights)
+
+    def weights_at(self, time: float) -> ComplexArray:
+        """Weights that sum the solutions h to the response at one instant.
+
+        Real parts of the sum are the response; lines but the first and the last one of an even
+        number of samples stand for their negative twins as well.
+
+        Args:
+            time: After the start of the lapse [s].
+
+        Returns:
+            Shape ``(num_motions, num_lines)``.
+        """
+        twice = np.where(self.lines == 0, 1.0, 2.0)
+        if self.num_samples % 2 == 0:
+            twice = np.where(self.lines == self.num_samples // 2, 1.0, twice)
+        return self.weights * (twice / self.num_samples * np.exp(1j * self.omega * time))
+
+
+@dataclass(frozen=True)
+class Histories:
+    """Motion of the receivers; see :class:`~fenics_hytf.lapse.records.LapseResult`."""
+
+    transfer: ComplexArray
+    displacement: RealArray
+    velocity: RealArray
+    acceleration: RealArray
+    total_acceleration: RealArray
+
+
+class ReceiverProbe:
+    """Evaluates the response at the receivers.
+
+    Args:
+        domain: The domain.
+        T: Constraint matrix.
+        sites: Receivers in owned cells of this rank.
+        numbers: Their numbers among all receivers, shape ``(len(sites),)``.
+        count: Receivers of all ranks.
+    """
+
+    def __init__(
+        self,
+        domain: Domain,
+        T: PETSc.Mat,
+        sites: Sites,
+        numbers: npt.NDArray[np.intp],
+        count: int,
+    ) -> None:
+        local = displacement_rows(transfer_matrix(sites, domain.V), domain.gdim)
+        self._rows = constrained_rows(domain, local, T)
+        self._domain, self._numbers, self._count = domain, numbers, count
+
+    def destroy(self) -> None:
+        """Destroy the rows."""
+        self._rows.destroy()
+
+    def histories(self, sweep: Sweep, excitation: Excitation) -> Histories:
+        """Histories and transfer functions of all receivers, on every rank (collective)."""
+        gdim, omega = self._domain.gdim, excitation.omega
+        mine = sweep.project(self._rows)
+        h = np.zeros((self._count, gdim, len(excitation.axes), len(omega)), complex)
+        for numbers, part in self._domain.comm.allgather((self._numbers, mine)):
+            h[numbers] = part.reshape(len(numbers), gdim, *part.shape[1:])
+        transfer = -(omega**2) * h
+        for motion, axis in enumerate(excitation.axes):
+            transfer[:, axis, motion] += 1.0
+        u = excitation.respond(h.reshape(-1, *h.shape[2:])).reshape(self._count, gdim, -1)
+        total = excitation.respond(transfer.reshape(-1, *h.shape[2:])).reshape(u.shape)
+        return Histories(
+            transfer,
+            excitation.to_time(u),
+            excitation.to_time(1j * omega * u),
+            excitation.to_time(-(omega**2) * u),
+            excitation.to_time(total),
+        )
+
+
+@dataclass(frozen=True)
+class CellPeaks:
+    """Largest values over the lapse, all cells in the order of the input.
+
+    Attributes:
+        strain: Shear strain [-], shape ``(num_cells,)``.
+        stress: Shear stress [Pa], shape ``(num_cells,)``.
+        acceleration: Norm of the total acceleration [m/s^2], shape ``(num_cells,)``.
+    """
+
+    strain: RealArray
+    stress: RealArray
+    acceleration: RealArray
+
+
+class CellProbe:
+    """Evaluates the response at the centres of cells.
+
+    Args:
+        domain: The domain.
+        T: Constraint matrix.
+        convention: Strain measure, see :func:`shear_strain`.
+    """
+
+    def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
+        self._domain, self._convention = domain, convention
+        owned = domain.num_owned_cells
+        blocks = domain.comm.allreduce(-(-owned // _BLOCK), MPI.MAX)
+        self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
+        for block in range(blocks):
+            first, stop = min(block * _BLOCK, owned), min((block + 1) * _BLOCK, owned)
+            centres = cell_centres(domain.mesh, first, stop)
+            strain = strain_rows(gradient_matrices(centres, domain.V))
+            place = displacement_rows(transfer_matrix(centres, domain.V), domain.gdim)
+            rows = (constrained_rows(domain, r, T) for r in (strain, place))
+            self._blocks.append((slice(first, stop), *rows))
+
+    def destroy(self) -> None:
+        """Destroy the rows."""
+        for _, *rows in self._blocks:
+            for row in rows:
+                row.destroy()
+
+    def _strain(self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation) -> ComplexArray:
+        """Strain spectra of a block, shape ``(num_cells, num_strains, num_lines)``."""
+        gdim = self._domain.gdim
+        spectra = excitation.respond(sweep.project(rows))
+        return spectra.reshape(-1, gdim * (gdim + 1) // 2, spectra.shape[-1])
+
+    def peak_strain(self, sweep: Sweep, excitation: Excitation) -> RealArray:
+        """Largest shear strain of every cell (collective).
+
+        Args:
+            sweep: Transfer functions h.
+            excitation: The input.
+
+        Returns:
+            All cells in the order of the input [-], shape ``(num_cells,)``.
+        """
+        peak = np.empty(self._domain.num_owned_cells)
+        for cells, strain, _ in self._blocks:
+            history = excitation.to_time(self._strain(strain, sweep, excitation))
+            peak[cells] = shear_strain(history, self._convention).max(axis=1, initial=0.0)
+        return self._domain.gather_cells(peak)
+
+    def peaks(
+        self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray
+    ) -> CellPeaks:
+        """Largest strain, stress and acceleration of every cell (collective).
+
+        Args:
+            sweep: Transfer functions h.
+            excitation: The input.
+            modulus: Complex shear modulus G* of every cell [Pa], shape ``(num_cells,)``.
+
+        Returns:
+            The peaks.
+        """
+        domain = self._domain
+        mine = modulus[domain.input_cells[: domain.num_owned_cells]]
+        peak = np.empty((domain.num_owned_cells, 3))
+        at_rest = excitation.omega == 0
+        for cells, strain, place in self._blocks:
+            spectra = self._strain(strain, sweep, excitation)
+            # G* is real at ω = 0 (METHOD, section 1).
+            factor = np.where(at_rest, mine[cells, None].real, mine[cells, None])[:, None, :]
+            for column, values in ((0, spectra), (1, factor * spectra)):
+                history = shear_strain(excitation.to_time(values), self._convention)
+                peak[cells, column] = history.max(axis=1, initial=0.0)
+            total = self._total_acceleration(place, sweep, excitation)
+            peak[cells, 2] = np.linalg.norm(total, axis=1).max(axis=1, initial=0.0)
+        return CellPeaks(*domain.gather_cells(peak).T)
+
+    def _total_acceleration(
+        self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation
+    ) -> RealArray:
+        u = excitation.respond(sweep.project(rows))
+        u = u.reshape(-1, self._domain.gdim, u.shape[-1])
+        total = -(excitation.omega**2) * u
+        for motion, axis in enumerate(excitation.axes):
+            total[:, axis] += excitation.weights[motion]
+        return excitation.to_time(total)

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: MIT
+"""One lapse: the input at its lines, sweeps with given moduli, and the equivalent-linear loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.frequency import Sweep, direct_sweep
+from fenics_hytf.lapse.equations import Equations
+from fenics_hytf.lapse.equivalent_linear import iterate
+from fenics_hytf.lapse.ground import ElasticConstants, Ground, Moduli, complex_constants
+from fenics_hytf.lapse.records import LoopHistory
+from fenics_hytf.lapse.response import CellProbe, Excitation
+from fenics_hytf.motion import excited_lines, to_frequency
+from fenics_hytf.scene import Scene
+
+RealArray = npt.NDArray[np.float64]
+
+
+@dataclass
+class Tally:
+    """What the sweeps of a lapse cost."""
+
+    factorisations: int = 0
+    solves: int = 0
+
+
+@dataclass(frozen=True)
+class Observer:
+    """Where a lapse reports to while it runs.
+
+    Attributes:
+        sweeping: Called with the iteration, the lines done and their number.
+        iterated: Called with the iteration and its change.
+        phase: Context manager by the name of the phase, which measures its time.
+    """
+
+    sweeping: Callable[[int, int, int], None]
+    iterated: Callable[[int, float], None]
+    phase: Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The solution of a lapse.
+
+    Attributes:
+        excitation: The input at the solved lines.
+        sweep: Transfer functions h(ω) of each motion (5).
+        moduli: Moduli it was solved with.
+        constants: Real elastic constants it was solved with.
+        effective_strain: Of every cell [-], or ``None`` without the equivalent-linear loop.
+        loop: History of the loop.
+        tally: Factorisations and solves.
+    """
+
+    excitation: Excitation
+    sweep: Sweep
+    moduli: Moduli
+    constants: ElasticConstants
+    effective_strain: RealArray | None
+    loop: LoopHistory
+    tally: Tally = field(default_factory=Tally)
+
+
+def excite(scene: Scene, acceleration: RealArray, axes: tuple[int, ...]) -> Excitation:
+    """Find the lines of a lapse that carry energy (METHOD, section 2).
+
+    Args:
+        scene: The scene: thresholds and time step.
+        acceleration: Base acceleration in the lapse [m/s^2], shape ``(num_motions, num_samples)``.
+        axes: Component in which each motion acts.
+
+    Returns:
+        The input at those lines.
+    """
+    spectra = to_frequency(acceleration)
+    num_samples = acceleration.shape[1]
+    limits = (scene.solver.excited, scene.solver.max_frequency)
+    lines = excited_lines(spectra, scene.dt, num_samples, *limits)
+    everywhere = excited_lines(spectra, scene.dt, num_samples, scene.solver.excited)
+    return Excitation(lines, spectra[:, lines], axes, num_samples, scene.dt, len(everywhere))
+
+
+def solve(
+    scene: Scene,
+    equations: Equations,
+    ground: Ground,
+    excitation: Excitation,
+    probe: CellProbe,
+    start: RealArray,
+    observer: Observer,
+    stress: RealArray | None = None,
+    strain_from: npt.NDArray[np.intp] | None = None,
+) -> Solved:
+    """Solve a lapse: one sweep, or the equivalent-linear loop round it.
+
+    Args:
+        scene: The scene.
+        equations: The equations, their mass weighed.
+        ground: The ground.
+        excitation: The input.
+        probe: Evaluates strain in the cells.
+        start: First effective strain of every cell [-], shape ``(num_cells,)``.
+        observer: Where to report.
+        stress: Stress for the geometric stiffness, see :meth:`Equations.assemble`.
+        strain_from: See :func:`iterate`.
+
+    Returns:
+        The solution.
+
+    Raises:
+        SweepError: A line cannot be solved.
+        EquivalentLinearError: The loop reaches its limit.
+    """
+    solver = scene.solver
+    tally = Tally()
+    last: list[tuple[Sweep, ElasticConstants]] = []
+
+    def sweep_with(moduli: Moduli, iteration: int) -> Sweep:
+        with observer.phase("assembly"):
+            parts = complex_constants(ground, moduli, solver.complex_modulus, solver.keep)
+            lapse = equations.assemble(*parts, stress)
+        with observer.phase("sweep"):
+            sweep = direct_sweep(
+                lapse.system,
+                lapse.sides,
+                1j * excitation.omega,
+                solver.tolerance,
+                lambda done, total: observer.sweeping(iteration, done, total),
+            )
+        tally.factorisations += sweep.factorisations
+        tally.solves += sweep.solves
+        last[:] = [(sweep, parts[0])]
+        return sweep
+
+    def peak_strain(moduli: Moduli, iteration: int) -> RealArray:
+        sweep = sweep_with(moduli, iteration)
+        with observer.phase("response"):
+            return probe.peak_strain(sweep, excitation)
+
+    effective, loop = None, LoopHistory()
+    if scene.effects.equivalent_linear is None:
+        moduli = ground.secant(start)
+        sweep_with(moduli, 0)
+    else:
+        moduli, effective, loop = iterate(
+            ground,
+            scene.effects.equivalent_linear,
+            start,
+            peak_strain,
+            observer.iterated,
+            strain_from,
+        )
+    ((sweep, constants),) = last
+    return Solved(excitation, sweep, moduli, constants, effective, loop, tally)

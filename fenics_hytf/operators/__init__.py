@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: MIT
+"""Stiffness, mass and damping matrices, and evaluation at sites as matrices."""
+
+from fenics_hytf.operators.forms import ElasticForm, GeometricForm
+from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
+from fenics_hytf.operators.rows import constrained_rows, displacement_rows, strain_rows
+
+__all__ = [
+    "ElasticForm",
+    "GeometricForm",
+    "assemble_mass",
+    "constrained_rows",
+    "displacement_rows",
+    "rayleigh_damping",
+    "strain_rows",
+]

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: MIT
+"""Stiffness as UFL forms with cell-wise coefficients.
+
+    K_L  = ∫ ε(v) : D : ε(u) dV                       (3), linear
+    K_NL = ∫ σ_ij u_k,i v_k,j dV                      (3), geometric, σ the Cauchy stress carried
+
+A form is compiled once a run and assembled again with other coefficients; a form that a scene does
+not call for is never made.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx.fem import Function, form, functionspace
+from dolfinx.fem.petsc import assemble_matrix, create_matrix
+from petsc4py import PETSc
+
+from fenics_hytf.domain import Domain
+
+
+class ElasticForm:
+    """K_L of an isotropic linear material, plane strain in 2D.
+
+    Args:
+        domain: The domain.
+    """
+
+    def __init__(self, domain: Domain) -> None:
+        cells = functionspace(domain.mesh, ("DG", 0))
+        self._lame_lambda, self._shear_modulus = Function(cells), Function(cells)
+        u, v = ufl.TrialFunction(domain.V), ufl.TestFunction(domain.V)
+
+        def strain(w: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
+            return ufl.sym(ufl.grad(w))
+
+        stress = self._lame_lambda * ufl.tr(strain(u)) * ufl.Identity(domain.gdim)
+        stress += 2 * self._shear_modulus * strain(u)
+        self._form = form(ufl.inner(stress, strain(v)) * _dx(domain))
+
+    def create_matrix(self) -> PETSc.Mat:
+        """Return a matrix with the form's pattern; the caller destroys it."""
+        return create_matrix(self._form)
+
+    def assemble(
+        self,
+        matrix: PETSc.Mat,
+        lame_lambda: npt.NDArray[np.float64],
+        shear_modulus: npt.NDArray[np.float64],
+    ) -> None:
+        """Assemble into a matrix.
+
+        Args:
+            matrix: From :meth:`create_matrix`, overwritten.
+            lame_lambda: λ of each local cell, ghosts included [Pa], shape ``(num_local_cells,)``.
+            shear_modulus: G of each local cell [Pa], same shape.
+        """
+        self._lame_lambda.x.array[:] = lame_lambda
+        self._shear_modulus.x.array[:] = shear_modulus
+        matrix.zeroEntries()
+        assemble_matrix(matrix, self._form)
+        matrix.assemble()
+
+
+class GeometricForm:
+    """K_NL of a cell-wise stress.
+
+    Args:
+        domain: The domain.
+    """
+
+    def __init__(self, domain: Domain) -> None:
+        gdim = domain.gdim
+        self._stress = Function(functionspace(domain.mesh, ("DG", 0, (gdim, gdim))))
+        u, v = ufl.TrialFunction(domain.V), ufl.TestFunction(domain.V)
+        self._form = form(
+            ufl.inner(ufl.dot(ufl.grad(u), self._stress), ufl.grad(v)) * _dx(domain)
+        )
+
+    def assemble(self, matrix: PETSc.Mat, stress: npt.NDArray[np.float64]) -> None:
+        """Assemble into a matrix of the elastic form's pattern.
+
+        Args:
+            matrix: Overwritten.
+            stress: Cauchy stress of each local cell, tension positive [Pa], shape
+                ``(num_local_cells, gdim, gdim)``.
+        """
+        self._stress.x.array[:] = stress.ravel()
+        matrix.zeroEntries()
+        assemble_matrix(matrix, self._form)
+        matrix.assemble()
+
+
+def _dx(domain: Domain) -> ufl.Measure:
+    # Gauss points that integrate the stiffness of a parallelogram exactly: degree + 1 a direction.
+    degree = 2 * domain.V.ufl_element().degree
+    return ufl.dx(domain.mesh, metadata={"quadrature_degree": degree})

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""The outer loop over lapses, and what it leaves behind."""
+
+from fenics_hytf.simulation.errors import SimulationError
+from fenics_hytf.simulation.flow import seed_points, simulate
+from fenics_hytf.simulation.inspection import Inspection, inspect
+from fenics_hytf.simulation.records import (
+    Progress,
+    ProgressCallback,
+    Result,
+    Snapshot,
+    SnapshotCallback,
+    Work,
+)
+
+__all__ = [
+    "Inspection",
+    "Progress",
+    "ProgressCallback",
+    "Result",
+    "SimulationError",
+    "Snapshot",
+    "SnapshotCallback",
+    "Work",
+    "inspect",
+    "seed_points",
+    "simulate",
+]

@@ -1,0 +1,342 @@
+# SPDX-License-Identifier: MIT
+"""The outer loop, as in the paper's flow chart: lapse by lapse, the points moving in between."""
+
+from __future__ import annotations
+
+import resource
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from fenics_hytf.domain import Domain, build
+from fenics_hytf.frequency import SweepError
+from fenics_hytf.lapse import (
+    CellProbe,
+    CellState,
+    Equations,
+    Ground,
+    LapseError,
+    LapseResult,
+    Observer,
+    ReceiverProbe,
+    Solved,
+    cell_stress,
+    convect,
+    excite,
+    first_strain,
+    solve,
+    survey,
+)
+from fenics_hytf.particles import (
+    Points,
+    PointsNotFinite,
+    PointsOutside,
+    default_points_per_cell,
+    seed,
+)
+from fenics_hytf.scene import Scene
+from fenics_hytf.simulation.clock import Clock
+from fenics_hytf.simulation.errors import SimulationError
+from fenics_hytf.simulation.receivers import Receivers
+from fenics_hytf.simulation.records import (
+    Progress,
+    ProgressCallback,
+    Result,
+    SnapshotCallback,
+    Work,
+)
+from fenics_hytf.simulation.snapshots import take_snapshot
+from fenics_hytf.soil import complex_factor
+
+RealArray = npt.NDArray[np.float64]
+
+
+def simulate(
+    scene: Scene,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    progress: ProgressCallback | None = None,
+    snapshot: SnapshotCallback | None = None,
+    strain_from: npt.NDArray[np.intp] | None = None,
+) -> Result:
+    """Run a scene: what ``hytf run`` does, without files (collective).
+
+    Args:
+        scene: The scene.
+        comm: Communicator; the mesh is distributed over its ranks.
+        progress: Called on rank 0 while the simulation runs.
+        snapshot: Called on every rank after every ``output.every``-th lapse, with points and
+            fields on rank 0.
+        strain_from: For every cell of the input the cell whose strain rules its moduli in the
+            equivalent-linear loop, shape ``(num_cells,)``; each cell's own if ``None``.
+
+    Returns:
+        The result, the same on every rank.
+
+    Raises:
+        SceneError: A fault that only the mesh shows.
+        SimulationError: The numerics stopped; it holds the lapses before.
+    """
+    run = _Run(scene, comm, progress, strain_from)
+    try:
+        for segment in scene.segments:
+            run.weigh()
+            solved = run.solve_lapse(segment.index, scene.base_acceleration[:, segment.samples])
+            run.observe(solved, segment.index, segment.start)
+            run.convect(solved)
+            if snapshot is not None and (segment.index + 1) % scene.output.every == 0:
+                run.show(solved, segment.index, segment.stop, snapshot)
+        return run.result()
+    except (SweepError, LapseError, PointsOutside, PointsNotFinite) as error:
+        partial = run.result() if run.lapses else None
+        raise SimulationError(len(run.lapses), str(error), partial) from error
+    finally:
+        run.destroy()
+
+
+class _Run:
+    """State that lives from lapse to lapse: mesh, points, equations, the warm start."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        comm: MPI.Comm,
+        progress: ProgressCallback | None,
+        strain_from: npt.NDArray[np.intp] | None,
+    ) -> None:
+        self.scene = scene
+        self.clock = Clock()
+        self.lapses: list[LapseResult] = []
+        self._work = Work(wall_s=self.clock.wall_s)
+        self._assemblies: Counter[str] = Counter()
+        self._progress = progress if comm.rank == 0 else None
+        self._strain_from = strain_from
+        self._ground: Ground | None = None
+        self._effective_strain: RealArray | None = None
+        with self.clock.phase("setup"):
+            self.domain = build(scene, comm)
+            self.points = seed_points(scene, self.domain)
+            self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
+            self.equations = Equations(scene, self.domain, self._assemblies)
+            loop = scene.effects.equivalent_linear
+            self._probe = CellProbe(
+                self.domain, self.equations.T, loop.strain if loop is not None else "plane"
+            )
+        self._axes = tuple(self.domain.components.index(m.direction) for m in scene.motion)
+        self._ledger = self.points.ledger(comm)
+
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+        self._probe.destroy()
+        self.equations.destroy()
+
+    def weigh(self) -> None:
+        """M = SᵀM_pS (4) and the soil of each cell, from the points where they are now."""
+        if self._ground is not None and not self.scene.effects.convection:
+            return
+        with self.clock.phase("assembly"):
+            self._ground = survey(self.scene, self.domain, self.points)
+            self.equations.weigh(self.points)
+
+    def solve_lapse(self, index: int, acceleration: RealArray) -> Solved:
+        """Transfer functions (5) of the lapse, with moduli that fit its strain."""
+        assert self._ground is not None
+        excitation = excite(self.scene, acceleration, self._axes)
+        stress = None
+        if self.scene.effects.geometric_stiffness:
+            stress = cell_stress(self.domain, self.points)
+        solved = solve(
+            self.scene,
+            self.equations,
+            self._ground,
+            excitation,
+            self._probe,
+            self._first_strain(),
+            self._observer(index),
+            stress,
+            self._strain_from,
+        )
+        self._effective_strain = solved.effective_strain
+        self._work.factorisations += solved.tally.factorisations
+        self._work.solves += solved.tally.solves
+        self._work.excited_lines += excitation.excited
+        return solved
+
+    def _first_strain(self) -> RealArray:
+        """Warm start from the lapse before, else PGV/Vs."""
+        assert self._ground is not None
+        loop = self.scene.effects.equivalent_linear
+        if loop is None:
+            return np.zeros(self.domain.num_cells)
+        if self._effective_strain is not None:
+            return self._effective_strain
+        density = np.array([self.scene.soil[name].density for name in self.domain.region_names])
+        velocity = max(float(np.abs(m.record.velocity()).max()) for m in self.scene.motion)
+        return first_strain(
+            self._ground, density[self._ground.region], velocity, loop.strain_ratio
+        )
+
+    def observe(self, solved: Solved, index: int, start: int) -> None:
+        """Response of receivers and cells: û(ω) = h(ω) ü̂_b(ω) (6)."""
+        assert self._ground is not None
+        excitation = solved.excitation
+        with self.clock.phase("response"):
+            sites, numbers = self.receivers.sites(self.points)
+            probe = ReceiverProbe(
+                self.domain, self.equations.T, sites, numbers, len(self.receivers.names)
+            )
+            histories = probe.histories(solved.sweep, excitation)
+            probe.destroy()
+            cells = self._cell_state(solved)
+            carried = self.receivers.carried(self.points)
+        self.lapses.append(
+            LapseResult(
+                index=index,
+                start_time=start * self.scene.dt,
+                num_samples=excitation.num_samples,
+                dt=self.scene.dt,
+                excited_lines=excitation.excited,
+                solved_lines=len(excitation.lines),
+                factorisations=solved.tally.factorisations,
+                solves=solved.tally.solves,
+                worst_residual=float(solved.sweep.residuals.max(initial=0.0)),
+                loop=solved.loop,
+                frequency=excitation.frequency,
+                transfer=histories.transfer,
+                displacement=histories.displacement + carried[:, :, None],
+                velocity=histories.velocity,
+                acceleration=histories.acceleration,
+                total_acceleration=histories.total_acceleration,
+                cells=cells,
+                ledger=self._ledger,
+            )
+        )
+        self._report(index, "lapse", residual=self.lapses[-1].worst_residual)
+
+    def _cell_state(self, solved: Solved) -> CellState:
+        assert self._ground is not None
+        ground, moduli = self._ground, solved.moduli
+        factor = complex_factor(moduli.damping, self.scene.solver.complex_modulus)
+        peaks = self._probe.peaks(solved.sweep, solved.excitation, moduli.shear_modulus * factor)
+        effective = solved.effective_strain
+        return CellState(
+            region=ground.region,
+            centroid=self._centroids(),
+            shear_modulus=moduli.shear_modulus,
+            g_over_gmax=moduli.shear_modulus / ground.shear_modulus,
+            damping=moduli.damping,
+            effective_strain=peaks.strain if effective is None else effective,
+            peak_strain=peaks.strain,
+            peak_stress=peaks.stress,
+            peak_acceleration=peaks.acceleration,
+        )
+
+    def _centroids(self) -> RealArray:
+        mesh = self.domain.mesh
+        nodes = mesh.geometry.x[mesh.geometry.dofmap[: self.domain.num_owned_cells]]
+        return self.domain.gather_cells(nodes.mean(axis=1)[:, : self.domain.gdim])
+
+    def convect(self, solved: Solved) -> None:
+        """Points take u(t_end) − u(t_start), move, and are found again by (7)-(9)."""
+        if not self.scene.effects.convection:
+            return
+        with self.clock.phase("convection"):
+            excitation, sweep = solved.excitation, solved.sweep
+            duration = excitation.num_samples * excitation.dt
+
+            def field(time: float, derivative: int) -> RealArray:
+                weights = excitation.weights_at(time) * (1j * excitation.omega) ** derivative
+                return self.equations.expand(sweep.combine(weights))
+
+            report = convect(
+                self.domain,
+                self.points,
+                field(duration, 0) - field(0.0, 0),
+                self.scene.points.outside,
+                solved.constants,
+                field(duration, 1),
+                field(duration, 2),
+            )
+        self._ledger = report.ledger
+        self._work.inverse_mappings += report.inverse_mappings
+        self.lapses[-1] = replace(self.lapses[-1], ledger=report.ledger)
+
+    def show(self, solved: Solved, index: int, stop: int, snapshot: SnapshotCallback) -> None:
+        """Hand points and fields to whoever writes them."""
+        with self.clock.phase("output"):
+            snapshot(
+                take_snapshot(
+                    self.scene,
+                    self.domain,
+                    self.points,
+                    self.equations,
+                    solved,
+                    self.lapses[-1],
+                    stop * self.scene.dt,
+                )
+            )
+
+    def _observer(self, index: int) -> Observer:
+        return Observer(
+            lambda iteration, done, total: self._report(
+                index, "sweep", iteration=iteration, done=done, total=total
+            ),
+            lambda iteration, change: self._report(
+                index, "iteration", iteration=iteration, change=change
+            ),
+            self.clock.phase,
+        )
+
+    def _report(self, index: int, phase: str, **values: float) -> None:
+        if self._progress is not None:
+            self._progress(Progress(index, len(self.scene.segments), phase, **values))  # type: ignore[arg-type]
+
+    def result(self) -> Result:
+        """Everything so far."""
+        comm = self.domain.comm
+        self._work.assemblies = dict(self._assemblies)
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        return Result(
+            scene=self.scene,
+            num_ranks=comm.size,
+            components=self.domain.components,
+            directions=tuple(m.direction for m in self.scene.motion),
+            receivers=self.receivers.names,
+            places=self.receivers.places,
+            region_names=self.domain.region_names,
+            dt=self.scene.dt,
+            base_acceleration=self.scene.base_acceleration,
+            lapses=tuple(self.lapses),
+            sizes={
+                "cells": self.domain.num_cells,
+                "unknowns": self.equations.num_unknowns,
+                "points": self._ledger.num_points,
+            },
+            work=self._work,
+            peak_memory=comm.allreduce(memory, MPI.MAX),
+        )
+
+
+def seed_points(scene: Scene, domain: Domain) -> Points:
+    """Fill the cells with points; only what an effect of the scene carries gets an array.
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+
+    Returns:
+        The points of this rank.
+    """
+    fields = []
+    if scene.effects.convection:
+        fields += ["velocity", "acceleration", "strain"]
+    if scene.effects.geometric_stiffness:
+        fields += ["stress"]
+    density = [scene.soil[name].density for name in domain.region_names]
+    cell_type = domain.mesh.topology.cell_name()
+    count = scene.mesh.points_per_cell or default_points_per_cell(cell_type, scene.mesh.degree)
+    return seed(domain.mesh, domain.regions, density, count, fields)
+
+

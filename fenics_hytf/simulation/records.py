@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: MIT
+"""What a simulation leaves behind: plain records, the same on every rank."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.lapse.records import LapseResult
+from fenics_hytf.scene import Scene
+
+RealArray = npt.NDArray[np.float64]
+
+
+@dataclass
+class Work:
+    """Counts of what was done, over all lapses and iterations.
+
+    Attributes:
+        factorisations: Matrix factorisations.
+        solves: Solves with a factorised matrix.
+        excited_lines: Excited lines, summed over lapses.
+        inverse_mappings: Points whose reference coordinates were searched by Newton iteration.
+        assemblies: Assemblies by the name of the form: ``elasticity``, ``geometric``, ``mass``,
+            ``rayleigh``. A form that a scene does not call for has no entry.
+        wall_s: Wall seconds by phase: ``setup``, ``assembly``, ``sweep``, ``response``,
+            ``convection``, ``output``.
+    """
+
+    factorisations: int = 0
+    solves: int = 0
+    excited_lines: int = 0
+    inverse_mappings: int = 0
+    assemblies: dict[str, int] = field(default_factory=dict)
+    wall_s: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Points and nodal fields after a lapse, gathered on rank 0 (``None`` elsewhere).
+
+    Attributes:
+        index: Number of the lapse.
+        time: End of the lapse [s].
+        points: Arrays of the material points by name (``position`` [m] with shape
+            ``(num_points, gdim)``, ``displacement`` [m], ``mass`` [kg/m or kg], ``volume``,
+            ``id``, ``cell``, ``shear_modulus`` [Pa] ...), or ``None``.
+        vertices: Mesh vertices [m], shape ``(num_vertices, gdim)``, or ``None`` without fields.
+        cells: Vertices of each cell in VTK order, shape ``(num_cells, n)``, or ``None``.
+        cell_type: meshio's name of the cell type.
+        vertex_fields: By name, shape ``(num_vertices, gdim)`` or ``(num_vertices,)``.
+        cell_fields: By name, shape ``(num_cells,)``.
+    """
+
+    index: int
+    time: float
+    points: dict[str, npt.NDArray[np.generic]] | None
+    vertices: RealArray | None = None
+    cells: npt.NDArray[np.int64] | None = None
+    cell_type: str = ""
+    vertex_fields: dict[str, RealArray] = field(default_factory=dict)
+    cell_fields: dict[str, RealArray] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One report of progress, rank 0 only.
+
+    Attributes:
+        lapse: Number of the lapse, from 0.
+        num_lapses: How many there are.
+        phase: ``"sweep"``, ``"iteration"``, ``"lapse"`` (a lapse is done).
+        iteration: Equivalent-linear iteration, from 1 (0 without the loop).
+        done: Lines solved in the running sweep.
+        total: Lines of the running sweep.
+        change: Last change of the equivalent-linear loop [-], or NaN.
+        residual: Worst residual so far [-], or NaN.
+    """
+
+    lapse: int
+    num_lapses: int
+    phase: str
+    iteration: int = 0
+    done: int = 0
+    total: int = 0
+    change: float = float("nan")
+    residual: float = float("nan")
+
+
+ProgressCallback = Callable[[Progress], None]
+SnapshotCallback = Callable[[Snapshot], None]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A finished simulation.
+
+    Attributes:
+        scene: The scene that was run.
+        num_ranks: MPI ranks.
+        components: Names of the displacement components, ``("x", "y")`` or with ``"z"``.
+        directions: Direction of each motion.
+        receivers: Names.
+        places: Places of the receivers at the start [m], shape ``(num_receivers, gdim)``.
+        region_names: Names of the mesh's regions.
+        dt: Time step [s].
+        base_acceleration: Input as used, zero-padded [m/s^2], shape ``(num_motions, num_samples)``.
+        lapses: One record a lapse.
+        sizes: ``cells``, ``unknowns``, ``points``.
+        work: Counts and wall seconds.
+        peak_memory: Largest resident memory of a rank [bytes].
+    """
+
+    scene: Scene
+    num_ranks: int
+    components: tuple[str, ...]
+    directions: tuple[str, ...]
+    receivers: tuple[str, ...]
+    places: RealArray
+    region_names: tuple[str, ...]
+    dt: float
+    base_acceleration: RealArray
+    lapses: tuple[LapseResult, ...]
+    sizes: dict[str, int]
+    work: Work
+    peak_memory: int
+
+    @property
+    def time(self) -> RealArray:
+        """Time of every sample of the record [s], shape ``(num_samples,)``."""
+        return self.dt * np.arange(self.base_acceleration.shape[1])
+
+    def history(self, name: str) -> RealArray:
+        """Receiver histories over the whole record.
+
+        Args:
+            name: ``displacement``, ``velocity``, ``acceleration`` or ``total_acceleration``.
+
+        Returns:
+            The lapses joined sample for sample, shape ``(num_receivers, gdim, num_samples)``.
+        """
+        return np.concatenate([getattr(lapse, name) for lapse in self.lapses], axis=2)

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: MIT
+"""Points and nodal fields of a lapse, brought together on rank 0 for whoever writes them."""
+
+from __future__ import annotations
+
+import basix
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf import _compat
+from fenics_hytf.domain import Domain
+from fenics_hytf.lapse import Equations, LapseResult, Solved
+from fenics_hytf.particles import Points
+from fenics_hytf.scene import Scene
+from fenics_hytf.simulation.records import Snapshot
+
+_MESHIO = {
+    "triangle": "triangle",
+    "quadrilateral": "quad",
+    "tetrahedron": "tetra",
+    "hexahedron": "hexahedron",
+}
+
+
+def take_snapshot(
+    scene: Scene,
+    domain: Domain,
+    points: Points,
+    equations: Equations,
+    solved: Solved,
+    lapse: LapseResult,
+    time: float,
+) -> Snapshot:
+    """Gather points, and fields where the scene asks for them (collective).
+
+    The displacement field is that of the instant at which a receiver moves farthest (the middle of
+    the lapse where there is none).
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+        points: The points after the lapse.
+        equations: The equations, which expand unknowns to nodes.
+        solved: The lapse's solution.
+        lapse: The lapse's result.
+        time: End of the lapse [s].
+
+    Returns:
+        The snapshot, filled on rank 0 only.
+    """
+    arrays = dict(points.arrays())
+    arrays["position"] = arrays.pop("x")
+    cells = domain.input_cells[points.cell]
+    arrays["cell"] = cells
+    arrays["shear_modulus"] = solved.moduli.shear_modulus[cells]
+    del arrays["X"]
+    gathered = domain.comm.gather(arrays)
+    everyone = None
+    if gathered is not None:
+        everyone = {name: np.concatenate([part[name] for part in gathered]) for name in arrays}
+        order = np.argsort(everyone["id"])
+        everyone = {name: values[order] for name, values in everyone.items()}
+    if not scene.output.fields:
+        return Snapshot(lapse.index, time, everyone)
+    instant = _instant_of_peak(lapse)
+    weights = solved.excitation.weights_at(instant)
+    u = equations.expand(solved.sweep.combine(weights))
+    vertices, connectivity, values = _vertex_field(domain, u)
+    state = lapse.cells
+    return Snapshot(
+        lapse.index,
+        time,
+        everyone,
+        vertices,
+        connectivity,
+        _MESHIO[domain.mesh.topology.cell_name()],
+        {"displacement": values},
+        {
+            "shear_modulus": state.shear_modulus,
+            "g_over_gmax": state.g_over_gmax,
+            "damping": state.damping,
+            "effective_strain": state.effective_strain,
+            "peak_stress": state.peak_stress,
+            "peak_acceleration": state.peak_acceleration,
+        },
+    )
+
+
+def _instant_of_peak(lapse: LapseResult) -> float:
+    if not lapse.displacement.size:
+        return lapse.num_samples // 2 * lapse.dt
+    distance = np.linalg.norm(lapse.displacement, axis=1)
+    return int(np.argmax(distance.max(axis=0))) * lapse.dt
+
+
+def _vertex_field(
+    domain: Domain, u: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.float64]]:
+    """Corners of all cells in VTK order, cells in the order of the input, and u there.
+
+    Corners are numbered by the input's nodes, so that the file does not depend on the ranks.
+    """
+    mesh, owned = domain.mesh, domain.num_owned_cells
+    num_corners = len(basix.geometry(getattr(basix.CellType, mesh.topology.cell_name())))
+    vtk = np.argsort(_compat.vtk_permutation(mesh.topology.cell_name(), num_corners))
+    dofs = domain.V.dofmap.list[:owned, :num_corners][:, vtk]
+    nodes = _compat.geometry_dofmap(mesh)[:owned, :num_corners][:, vtk]
+    numbers = np.asarray(mesh.geometry.input_global_indices, np.int64)[nodes]
+    corners = domain.gather_cells(numbers)
+    places = domain.gather_cells(mesh.geometry.x[nodes][:, :, : domain.gdim])
+    values = domain.gather_cells(u[dofs])
+    used, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
+    gdim = domain.gdim
+    return (
+        places.reshape(-1, gdim)[first],
+        inverse.reshape(corners.shape).astype(np.int64),
+        values.reshape(-1, gdim)[first],
+    )
+
+
