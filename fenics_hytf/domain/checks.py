@@ -49,9 +49,9 @@ def refuse_inverted_cells(mesh: Mesh) -> None:
     everyone = sorted(item for part in mesh.comm.allgather(found) for item in part)
     if everyone:
         listed = ", ".join(f"{cell} ({value:.3g})" for cell, value in everyone[:5])
-        found = f"{len(everyone)} cells with a non-positive Jacobian, by input cell: {listed}"
+        text = f"{len(everyone)} cells with a non-positive Jacobian, by input cell: {listed}"
         expected = (
             "convex cells with counter-clockwise (3D: right-handed) nodes; repair them, or reverse "
             "the surface in the mesh generator"
         )
-        raise SceneError([Fault("mesh", found, expected)])
+        raise SceneError([Fault("mesh", text, expected)])

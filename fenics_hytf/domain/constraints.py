@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""All constraints in one sparse matrix: u = T q, and A_q = Tᵀ A T (METHOD, section 6).
+"""All constraints in one sparse matrix: u = T q, and A_q = Tᵀ A T.
 
-Every displacement is either free (it is an unknown of q), held at zero (an empty row of T), or tied:
-equal to the displacement of a partner across the mesh.
+Every displacement is free (an unknown of q), held at zero (an empty row of T), or tied: equal to
+that of a partner across the mesh.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ def _normal_axis(domain: Domain, name: str) -> int:
     axis = int(np.argmin(extent))
     if extent[axis] > 1e-9 * extent.max():
         expected = "a vertical or horizontal side under a roller, or 'fixed', or 'free'"
-        raise SceneError([Fault(f"boundary.{name}", "a side that is not parallel to an axis", expected)])
+        raise SceneError(
+            [Fault(f"boundary.{name}", "a side that is not parallel to an axis", expected)]
+        )
     return axis
 
 
@@ -86,16 +88,20 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
             nodes = nodes[nodes < size]
             numbers = V.dofmap.index_map.local_to_global(nodes)
             places = V.tabulate_dof_coordinates()[nodes, :gdim]
-            sides.append([np.concatenate(part) for part in
-                          zip(*domain.comm.allgather((numbers, places)), strict=True)])
+            sides.append(
+                [
+                    np.concatenate(part)
+                    for part in zip(*domain.comm.allgather((numbers, places)), strict=True)
+                ]
+            )
         (low_number, low_place), (high_number, high_place) = sides
         across = [a for a in range(gdim) if a != axis]
         _, partner, far = _match(low_place[:, across], high_place[:, across])
         if len(low_number) != len(high_number) or len(far):
             place = high_place[far[0]].tolist() if len(far) else "none in particular"
             found = (
-                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(far)} of them "
-                f"without a partner (the first at {place})"
+                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(far)} "
+                f"of them without a partner (the first at {place})"
             )
             expected = "the same nodes on both tied sides: mesh them alike"
             raise SceneError([Fault(f"boundary.{high}", found, expected)])
@@ -125,18 +131,18 @@ def _share_holds(domain: Domain, held: npt.NDArray[np.bool_], image: dict[int, i
     first = domain.V.dofmap.index_map.local_range[0]
     family = np.array(sorted(set(image) | set(image.values())), np.int64)
     mine = family[(family >= first) & (family < first + len(held))]
-    flags = {}
+    flags: dict[int, npt.NDArray[np.bool_]] = {}
     for numbers, part in domain.comm.allgather((mine, held[mine - first])):
         for number, flag in zip(numbers.tolist(), part, strict=True):
             root = image.get(number, number)
-            flags[root] = flags.get(root, False) | flag
+            flags[root] = flags[root] | flag if root in flags else flag
     for number in mine.tolist():
         held[number - first] |= flags[image.get(number, number)]
 
 
 def _assemble(V: FunctionSpace, held: npt.NDArray[np.bool_], image: dict[int, int]) -> PETSc.Mat:
     comm = V.mesh.comm
-    num_nodes, gdim = held.shape
+    num_nodes = len(held)
     first = V.dofmap.index_map.local_range[0]
     node = np.arange(first, first + num_nodes)
     slave = np.isin(node, np.fromiter(image, np.int64, len(image)))
@@ -151,7 +157,7 @@ def _assemble(V: FunctionSpace, held: npt.NDArray[np.bool_], image: dict[int, in
     numbers: dict[int, npt.NDArray[np.int64]] = {}
     for part in comm.allgather(dict(zip(mine.tolist(), unknown[mine - first], strict=True))):
         numbers.update(part)
-    for number in node[slave].tolist():
+    for number in map(int, node[slave]):
         unknown[number - first] = numbers[image[number]]
     column = unknown.ravel()
     filled = column >= 0

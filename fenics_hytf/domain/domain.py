@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
 
 import basix.ufl
 import numpy as np
@@ -18,6 +20,8 @@ from fenics_hytf.domain.checks import refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
 from fenics_hytf.scene import Fault, Scene, SceneError
+
+Scalar = TypeVar("Scalar", np.float64, np.int64)
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class Domain:
         """Input number of each local cell, ghosts included, shape ``(num_local_cells,)``."""
         return np.asarray(self.mesh.topology.original_cell_index, np.int64)
 
-    def gather_cells(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    def gather_cells(self, values: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
         """Bring values of owned cells into the order of the input, on every rank.
 
         Args:
@@ -133,7 +137,7 @@ def _mesh_data(scene: Scene) -> MeshData:
         return column_mesh(scene.mesh.column)
     if scene.mesh.box is not None:
         return box_mesh(scene.mesh.box, scene.mesh, soils)
-    data = read_mesh(scene.mesh.file, soils)
+    data = read_mesh(Path(scene.mesh.file or ""), soils)
     faults = []
     missing = [name for name in data.region_names if name not in soils]
     if missing:
@@ -153,7 +157,9 @@ def _mesh_data(scene: Scene) -> MeshData:
 
 
 def _distribute(data: MeshData | None, comm: MPI.Comm) -> Mesh:
-    shape = (data.cell_type, data.degree, data.points.shape[1], data.cells.shape[1]) if data else None
+    shape = None
+    if data:
+        shape = (data.cell_type, data.degree, data.points.shape[1], data.cells.shape[1])
     cell_type, degree, gdim, width = comm.bcast(shape)
     cells = data.cells if data else np.empty((0, width), np.int64)
     points = data.points if data else np.empty((0, gdim))
@@ -171,7 +177,12 @@ def _boundaries(
     found: dict[str, npt.NDArray[np.int32]] = {}
     size = comm.allreduce(float(np.abs(mesh.geometry.x).max(initial=0.0)), MPI.MAX)
     for name, (axis, place) in planes.items():
-        on_plane = lambda x, a=axis, p=place: np.abs(x[a] - p) <= 1e-12 * size  # noqa: E731
+
+        def on_plane(
+            x: npt.NDArray[np.float64], axis: int = axis, place: float = place
+        ) -> npt.NDArray[np.bool_]:
+            return np.abs(x[axis] - place) <= 1e-12 * size  # round-off of the coordinates
+
         found[name] = locate_entities_boundary(mesh, fdim, on_plane)
     for name in facets:
         nodes = data.facets[name] if data else np.empty((0, 0), np.int64)

@@ -74,7 +74,14 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
     }
     facets = {k: f[(f >= 0).all(axis=1)] for k, f in facets.items()}
     return MeshData(
-        points[used], inverse.reshape(cells.shape)[:, order], name, degree, region, names, {}, facets
+        points[used],
+        inverse.reshape(cells.shape)[:, order],
+        name,
+        degree,
+        region,
+        names,
+        {},
+        facets,
     )
 
 
@@ -93,8 +100,8 @@ def _cell_kind(raw: meshio.Mesh, path: Path) -> str:
     dims = {kind: _CELLS[kind][1] for kind in found if kind in _CELLS}
     top = {kind for kind, dim in dims.items() if dim == max(dims.values(), default=0)}
     if len(top) != 1:
-        found = ", ".join(sorted(top)) or "no cells"
-        raise _fault(f"{found} in {path.name}", "cells of one type")
+        kinds = ", ".join(sorted(top)) or "no cells"
+        raise _fault(f"{kinds} in {path.name}", "cells of one type")
     return top.pop()
 
 

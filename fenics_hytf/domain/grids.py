@@ -68,7 +68,13 @@ def column_mesh(column: Column) -> MeshData:
         [np.full(layer.cells, names.index(layer.soil), np.int32) for layer in column.layers]
     )
     return MeshData(
-        points, cells[::-1].copy(), "quadrilateral", 1, region, names, _sides([column.width, column.height])
+        points,
+        cells[::-1].copy(),
+        "quadrilateral",
+        1,
+        region,
+        names,
+        _sides([column.width, column.height]),
     )
 
 
@@ -87,7 +93,10 @@ def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
     Raises:
         SceneError: A cell's centroid lies in no region.
     """
-    axes = [np.linspace(0.0, size, n + 1) for size, n in zip(box.size, box.cells, strict=True)]
+    axes = [
+        np.asarray(np.linspace(0.0, size, n + 1))
+        for size, n in zip(box.size, box.cells, strict=True)
+    ]
     points, cells = _grid(axes)
     if box.cell == "triangle":
         cells = cells[:, np.array(_TRIANGLES)].reshape(-1, 3)

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """The direct sweep: one factorisation a frequency, the reference for every other sweep.
 
-MUMPS LDLᵀ of the complex symmetric A(s), one matrix kept and refilled (METHOD, section 3).
+LDLᵀ of the complex symmetric A(s), by MUMPS or, where it is small, by PETSc itself; one matrix is
+kept and refilled.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +19,31 @@ from fenics_hytf.frequency.sweep import DenseSweep
 from fenics_hytf.frequency.system import DynamicSystem
 
 _PREFIX = "hytf_direct_"
+
+
+# PETSc's own LDLᵀ has no start-up cost: on a column of 192 unknowns it took a quarter of MUMPS'
+# time, on a section of 1640 one and a half times as much; they meet at about 600. It is serial.
+_SMALL = 500
+
+
+@dataclass(frozen=True)
+class _Package:
+    """A way to factorise.
+
+    Attributes:
+        name: PETSc's name of the solver package.
+        pivot: MUMPS' threshold of pivoting; 0 for none.
+    """
+
+    name: str
+    pivot: float = 0.0
+
+
+def _packages(A: PETSc.Mat) -> list[_Package]:
+    """Ways to factorise, the quickest first; the next one takes over where one fails."""
+    small = A.comm.size == 1 and A.getSize()[0] <= _SMALL
+    first = PETSc.Mat.SolverType.PETSC if small else PETSc.Mat.SolverType.MUMPS
+    return [_Package(first), _Package(PETSc.Mat.SolverType.MUMPS, pivot=0.01)]
 
 
 class SymmetricFactorisation:
@@ -34,7 +61,7 @@ class SymmetricFactorisation:
         self.A = system.create_matrix()
         self._residual = self.A.createVecLeft()
         self._correction = self.A.createVecRight()
-        self._pivoting = False
+        self._choices = _packages(self.A)
         self._solver = self._create_solver()
 
     def __enter__(self) -> SymmetricFactorisation:
@@ -51,7 +78,9 @@ class SymmetricFactorisation:
         solver.setErrorIfNotConverged(True)
         pc = solver.getPC()
         pc.setType(PETSc.PC.Type.CHOLESKY)
-        pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
+        pc.setFactorSolverType(self._choices[0].name)
+        if self._choices[0].name == PETSc.Mat.SolverType.PETSC:
+            pc.setFactorOrdering(PETSc.Mat.OrderingType.RCM)
         return solver
 
     def factorise(self, s: complex) -> None:
@@ -61,30 +90,41 @@ class SymmetricFactorisation:
             s: Complex frequency η + iω [rad/s].
 
         Raises:
-            FactorisationError: A(s) is singular, or MUMPS failed otherwise.
+            FactorisationError: A(s) is singular, or the factorisation failed otherwise.
         """
         self._system.fill(self.A, s)
         self._s = s
         self._factorise()
 
     def _factorise(self) -> None:
-        solver = self._solver
+        self.factorisations += 1
+        solver, package = self._solver, self._choices[0]
         # Without setOperators the refactorisation silently does not happen.
         solver.setOperators(self.A)
-        pc = solver.getPC()
+        try:
+            if package.name == PETSc.Mat.SolverType.MUMPS:
+                self._tune_mumps(package.pivot)
+            solver.setUp()
+        except PETSc.Error as error:
+            self._fall_back(error)
+
+    def _tune_mumps(self, pivot: float) -> None:
+        pc = self._solver.getPC()
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
         factor.setMumpsIcntl(7, 4)  # PORD: the default ordering is worse than LU's in 3D
         factor.setMumpsIcntl(12, 1)  # no compressed ordering of symmetric indefinite matrices
         factor.setMumpsIcntl(6, 0)  # no column permutation
-        factor.setMumpsCntl(1, 0.01 if self._pivoting else 0.0)
-        try:
-            solver.setUp()
-        except PETSc.Error as error:
-            raise FactorisationError(self._s, factor.getMumpsInfog(1)) from error
-        if factor.getMumpsInfog(1) < 0:
-            raise FactorisationError(self._s, factor.getMumpsInfog(1))
-        self.factorisations += 1
+        factor.setMumpsCntl(1, pivot)
+
+    def _fall_back(self, cause: Exception) -> None:
+        """Factorise again with the next package, and stay with it."""
+        if len(self._choices) == 1:
+            raise FactorisationError(self._s) from cause
+        self._choices.pop(0)
+        self._solver.destroy()
+        self._solver = self._create_solver()
+        self._factorise()
 
     def solve(self, b: PETSc.Vec, x: PETSc.Vec, tolerance: float) -> float:
         """Solve A x = b and return the true relative residual.
@@ -111,13 +151,13 @@ class SymmetricFactorisation:
         residual = self._true_residual(b, x) / scale
         if residual > tolerance:
             residual = self._refine(b, x) / scale
-        if not residual <= tolerance and not self._pivoting:
-            self._pivoting = True
-            self._factorise()
-            return self.solve(b, x, tolerance)
-        if not residual <= tolerance:
-            raise ResidualError(self._s, residual, tolerance)
-        return residual
+        if residual <= tolerance:
+            return residual
+        failure = ResidualError(self._s, residual, tolerance)
+        if len(self._choices) == 1:
+            raise failure
+        self._fall_back(failure)
+        return self.solve(b, x, tolerance)
 
     def _true_residual(self, b: PETSc.Vec, x: PETSc.Vec) -> float:
         self.A.mult(x, self._residual)

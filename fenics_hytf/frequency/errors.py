@@ -21,11 +21,11 @@ class SweepError(RuntimeError):
 class FactorisationError(SweepError):
     """The matrix of a line is singular, or the factorisation failed otherwise."""
 
-    def __init__(self, s: complex, infog: int) -> None:
+    def __init__(self, s: complex) -> None:
         super().__init__(
             s,
-            f"found a matrix that MUMPS cannot factorise (INFOG(1) = {infog}); expected a regular "
-            "one: an undamped resonance needs damping, and every part of the mesh a support",
+            "found a matrix that cannot be factorised; expected a regular one: an undamped "
+            "resonance needs damping, and every part of the mesh a support",
         )
 
 

@@ -48,7 +48,8 @@ class DynamicSystem:
         M: PETSc.Mat,
         C: PETSc.Mat | None = None,
     ) -> None:
-        stiffness = [(K, constant)] if isinstance(K, PETSc.Mat) else list(K)
+        single = isinstance(K, PETSc.Mat)
+        stiffness: list[tuple[PETSc.Mat, ScalarFunction]] = [(K, constant)] if single else [*K]
         if not stiffness:
             raise ValueError("K: found no matrix; expected at least one")
         self.terms: list[tuple[PETSc.Mat, ScalarFunction]] = [

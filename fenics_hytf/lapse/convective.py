@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The convective phase between lapses (METHOD, section 5): points move, are found again, carry on.
+"""The convective phase between lapses: points move, are found again, carry on.
 
 Points take the increment Δu = S(u(t_end) − u(t_start)) of the lapse with its gradient; the mesh
 stays where it was. Under ``steady`` continuity a lapse is periodic and the net increment is zero.

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The equivalent-linear loop: the shear modulus and damping of every cell fit its effective strain.
 
-γ_eff = ratio × max_t γ(t) → curves → G, D → sweep → γ_eff ... (Seed & Idriss 1969; METHOD, section
-4), accelerated as a fixed point in ln γ_eff (Anderson 1965; Walker & Ni 2011).
+γ_eff = ratio × max_t γ(t) → curves → G, D → sweep → γ_eff ... (Seed & Idriss 1969),
+accelerated as a fixed point in ln γ_eff (Anderson 1965; Walker & Ni 2011).
 """
 
 from __future__ import annotations
@@ -106,9 +106,7 @@ def iterate(
         else:
             log_strain = np.where(nonlinear, accelerated.next(log_strain, image), image)
         moduli = ground.secant(np.exp(log_strain))
-    raise EquivalentLinearError(
-        settings.max_iterations, changes[-1], settings.tolerance, worst[-1]
-    )
+    raise EquivalentLinearError(settings.max_iterations, changes[-1], settings.tolerance, worst[-1])
 
 
 def first_strain(ground: Ground, density: RealArray, velocity: float, ratio: float) -> RealArray:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """The ground of one lapse: what soil the points have brought into each cell, and its stiffness.
 
-A cell takes the mean of the small-strain constants of the points in it, by volume, and the curves of
-the soil that fills most of it. All arrays hold every cell of the mesh in the order of the input, so
-that a run on several ranks adds in the same order as a serial one.
+A cell takes the mean of the small-strain constants of the points in it, by volume, and the curves
+of the soil that fills most of it. All arrays hold every cell of the mesh in the order of the
+input, so that a run on several ranks adds in the same order as a serial one.
 """
 
 from __future__ import annotations
@@ -107,12 +107,12 @@ def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
         [[s.elastic.shear_modulus, s.elastic.poisson, s.damping_ratio(with_curves)] for s in soils]
     )
     owned = domain.num_owned_cells
-    share = np.zeros((owned, len(soils)))
-    np.add.at(share, (points.cell, points.region), points.volume)
-    share = domain.gather_cells(share)
+    mine = np.zeros((owned, len(soils)))
+    np.add.at(mine, (points.cell, points.region), points.volume)
+    share = domain.gather_cells(mine)
     volume = share.sum(axis=1)
     if not volume.all():
-        raise EmptyCellError(np.flatnonzero(volume == 0).tolist())
+        raise EmptyCellError([int(cell) for cell in np.flatnonzero(volume == 0)])
     # A cell of one soil takes its constants as they stand, free of round-off.
     region = share.argmax(axis=1).astype(np.int32)
     mean = np.where(
@@ -132,7 +132,7 @@ def complex_constants(
     Args:
         ground: The ground, for Poisson's ratio and the small-strain bulk modulus.
         moduli: Secant modulus and damping.
-        convention: Name of the complex modulus (METHOD, section 1).
+        convention: Name of the complex modulus.
         keep: ``"poisson"``: the whole elasticity tensor takes the factor G*/G and G/G_max;
             ``"bulk"``: only its deviator does.
 
@@ -150,5 +150,3 @@ def complex_constants(
     if not np.any(G.imag):
         return real, None
     return real, ElasticConstants(lame.imag, G.imag)
-
-

@@ -229,9 +229,7 @@ class CellProbe:
             peak[cells] = shear_strain(history, self._convention).max(axis=1, initial=0.0)
         return self._domain.gather_cells(peak)
 
-    def peaks(
-        self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray
-    ) -> CellPeaks:
+    def peaks(self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray) -> CellPeaks:
         """Largest strain, stress and acceleration of every cell (collective).
 
         Args:
@@ -248,7 +246,7 @@ class CellProbe:
         at_rest = excitation.omega == 0
         for cells, strain, place in self._blocks:
             spectra = self._strain(strain, sweep, excitation)
-            # G* is real at ω = 0 (METHOD, section 1).
+            # G* is real at ω = 0.
             factor = np.where(at_rest, mine[cells, None].real, mine[cells, None])[:, None, :]
             for column, values in ((0, spectra), (1, factor * spectra)):
                 history = shear_strain(excitation.to_time(values), self._convention)

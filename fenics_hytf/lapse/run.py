@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -41,7 +42,7 @@ class Observer:
 
     sweeping: Callable[[int, int, int], None]
     iterated: Callable[[int, float], None]
-    phase: Callable[[str], object]
+    phase: Callable[[str], AbstractContextManager[None]]
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ class Solved:
 
 
 def excite(scene: Scene, acceleration: RealArray, axes: tuple[int, ...]) -> Excitation:
-    """Find the lines of a lapse that carry energy (METHOD, section 2).
+    """Find the lines of a lapse that carry energy.
 
     Args:
         scene: The scene: thresholds and time step.

@@ -74,9 +74,7 @@ class GeometricForm:
         gdim = domain.gdim
         self._stress = Function(functionspace(domain.mesh, ("DG", 0, (gdim, gdim))))
         u, v = ufl.TrialFunction(domain.V), ufl.TestFunction(domain.V)
-        self._form = form(
-            ufl.inner(ufl.dot(ufl.grad(u), self._stress), ufl.grad(v)) * _dx(domain)
-        )
+        self._form = form(ufl.inner(ufl.dot(ufl.grad(u), self._stress), ufl.grad(v)) * _dx(domain))
 
     def assemble(self, matrix: PETSc.Mat, stress: npt.NDArray[np.float64]) -> None:
         """Assemble into a matrix of the elastic form's pattern.

@@ -40,7 +40,7 @@ def strain_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
         Shape ``(num_sites·num_strains, num_local_nodes·gdim)``, strain components fastest.
     """
     gdim = len(gradients)
-    num_sites, num_nodes = gradients[0].shape
+    num_sites = gradients[0].shape[0]
     pairs = [(i, i) for i in range(gdim)]
     pairs += [(1, 2), (0, 2), (0, 1)] if gdim == 3 else [(0, 1)]
     parts = []

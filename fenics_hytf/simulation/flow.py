@@ -174,9 +174,7 @@ class _Run:
             return self._effective_strain
         density = np.array([self.scene.soil[name].density for name in self.domain.region_names])
         velocity = max(float(np.abs(m.record.velocity()).max()) for m in self.scene.motion)
-        return first_strain(
-            self._ground, density[self._ground.region], velocity, loop.strain_ratio
-        )
+        return first_strain(self._ground, density[self._ground.region], velocity, loop.strain_ratio)
 
     def observe(self, solved: Solved, index: int, start: int) -> None:
         """Response of receivers and cells: û(ω) = h(ω) ü̂_b(ω) (6)."""
@@ -338,5 +336,3 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
     cell_type = domain.mesh.topology.cell_name()
     count = scene.mesh.points_per_cell or default_points_per_cell(cell_type, scene.mesh.degree)
     return seed(domain.mesh, domain.regions, density, count, fields)
-
-

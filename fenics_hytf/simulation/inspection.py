@@ -86,9 +86,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         samples_per_lapse=scene.segments[0].num_samples,
         lines=lines,
         factorisations=sum(lines) * iterations,
-        memory_bytes=_memory(
-            unknowns, domain.gdim, max(lines, default=0) * len(axes), comm.size
-        )
+        memory_bytes=_memory(unknowns, domain.gdim, max(lines, default=0) * len(axes), comm.size)
         + num_points * points.bytes_per_point,
         notes=_notes(scene, lines),
     )

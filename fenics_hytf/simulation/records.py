@@ -131,7 +131,7 @@ class Result:
     @property
     def time(self) -> RealArray:
         """Time of every sample of the record [s], shape ``(num_samples,)``."""
-        return self.dt * np.arange(self.base_acceleration.shape[1])
+        return np.asarray(self.dt * np.arange(self.base_acceleration.shape[1]), np.float64)
 
     def history(self, name: str) -> RealArray:
         """Receiver histories over the whole record.

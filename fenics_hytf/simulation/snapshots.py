@@ -109,12 +109,10 @@ def _vertex_field(
     corners = domain.gather_cells(numbers)
     places = domain.gather_cells(mesh.geometry.x[nodes][:, :, : domain.gdim])
     values = domain.gather_cells(u[dofs])
-    used, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
     gdim = domain.gdim
     return (
         places.reshape(-1, gdim)[first],
         inverse.reshape(corners.shape).astype(np.int64),
         values.reshape(-1, gdim)[first],
     )
-
-

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: MIT
+"""Complex shear modulus G* of a soil with hysteretic damping ratio D, in four conventions.
+
+With e^{+iωt} and ω > 0 the imaginary part is positive; at negative frequencies it takes the sign
+of ω, at ω = 0 the modulus is real. The conventions agree to first order in D:
+
+==============  ==================================  =============================================
+``hysteretic``  G (1 + 2iD)                         constant real part
+``kramer``      G (1 - D² + 2iD)                    Kramer (1996), so that √G* ≈ √G (1 + iD)
+``shake91``     G (1 - 2D² + 2iD √(1 - D²))         Udaka (1975), Idriss and Sun (1992): |G*| = G
+``dormieux``    G (√(1 - 4D²) + 2iD)                Dormieux and Canou (1990): |G*| = G
+==============  ==================================  =============================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+def hysteretic(damping: npt.ArrayLike) -> ComplexArray:
+    """G*/G = 1 + 2iD.
+
+    Args:
+        damping: Damping ratio D [-], any shape, in [0, 1).
+
+    Returns:
+        G*/G [-], the shape of ``damping``.
+
+    Raises:
+        ValueError: If a damping ratio is out of range.
+    """
+    d = _checked(damping, "hysteretic", 1.0)
+    return np.asarray(1.0 + 2j * d)
+
+
+def kramer(damping: npt.ArrayLike) -> ComplexArray:
+    """G*/G = 1 - D² + 2iD.
+
+    Args:
+        damping: Damping ratio D [-], any shape, in [0, 1).
+
+    Returns:
+        G*/G [-], the shape of ``damping``.
+
+    Raises:
+        ValueError: If a damping ratio is out of range.
+    """
+    d = _checked(damping, "kramer", 1.0)
+    return np.asarray(1.0 - d**2 + 2j * d)
+
+
+def shake91(damping: npt.ArrayLike) -> ComplexArray:
+    """G*/G = 1 - 2D² + 2iD √(1 - D²).
+
+    Args:
+        damping: Damping ratio D [-], any shape, in [0, 1).
+
+    Returns:
+        G*/G [-], the shape of ``damping``.
+
+    Raises:
+        ValueError: If a damping ratio is out of range.
+    """
+    d = _checked(damping, "shake91", 1.0)
+    return np.asarray(1.0 - 2.0 * d**2 + 2j * d * np.sqrt(1.0 - d**2))
+
+
+def dormieux(damping: npt.ArrayLike) -> ComplexArray:
+    """G*/G = √(1 - 4D²) + 2iD.
+
+    Args:
+        damping: Damping ratio D [-], any shape, in [0, 0.5).
+
+    Returns:
+        G*/G [-], the shape of ``damping``.
+
+    Raises:
+        ValueError: If a damping ratio is out of range.
+    """
+    d = _checked(damping, "dormieux", 0.5)
+    return np.asarray(np.sqrt(1.0 - 4.0 * d**2) + 2j * d)
+
+
+COMPLEX_MODULUS: Mapping[str, Callable[[npt.ArrayLike], ComplexArray]] = MappingProxyType(
+    {"hysteretic": hysteretic, "kramer": kramer, "shake91": shake91, "dormieux": dormieux}
+)
+"""G*/G as a function of the damping ratio, by the name of the convention."""
+
+
+def complex_factor(damping: npt.ArrayLike, convention: str = "hysteretic") -> ComplexArray:
+    """G*/G at positive frequencies in a named convention.
+
+    Args:
+        damping: Damping ratio D [-], any shape, in [0, 1), for ``dormieux`` in [0, 0.5).
+        convention: A key of `COMPLEX_MODULUS`.
+
+    Returns:
+        G*/G [-], the shape of ``damping``.
+
+    Raises:
+        ValueError: If the convention is unknown or a damping ratio is out of range.
+    """
+    if convention not in COMPLEX_MODULUS:
+        raise ValueError(
+            f"complex_modulus: found '{convention}'; expected one of {', '.join(COMPLEX_MODULUS)}"
+        )
+    return COMPLEX_MODULUS[convention](damping)
+
+
+def _checked(damping: npt.ArrayLike, convention: str, limit: float) -> npt.NDArray[np.float64]:
+    """Damping ratios as an array, each in [0, limit)."""
+    values = np.asarray(damping, dtype=np.float64)
+    faulty = ~((values >= 0.0) & (values < limit))
+    if faulty.any():
+        raise ValueError(
+            f"damping: found {values[faulty][0]}; expected 0 <= damping < {limit:g} for the "
+            f"complex modulus '{convention}'"
+        )
+    return values
