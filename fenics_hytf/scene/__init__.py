@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: MIT
+"""The scene file: its schema, defaults and messages; which effects are called for.
+
+A scene is read and checked whole before anything is computed; every fault is reported at once,
+each with its key, what was found and what was expected. How anything is solved is not known here.
+"""
+
+from fenics_hytf.scene.boundary import default_kind
+from fenics_hytf.scene.check import Sections, check
+from fenics_hytf.scene.faults import Fault, SceneError
+from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh
+from fenics_hytf.scene.motion import MotionInput
+from fenics_hytf.scene.regions import Region
+from fenics_hytf.scene.scene import Scene, examine
+from fenics_hytf.scene.settings import (
+    Effects,
+    EquivalentLinear,
+    Lapses,
+    Output,
+    Points,
+    Rayleigh,
+    Receiver,
+    Solver,
+)
+from fenics_hytf.scene.soil import Soil
+
+__all__ = [
+    "Box",
+    "Column",
+    "Effects",
+    "EquivalentLinear",
+    "Fault",
+    "Lapses",
+    "Layer",
+    "Mesh",
+    "MotionInput",
+    "Output",
+    "Points",
+    "Rayleigh",
+    "Receiver",
+    "Region",
+    "Scene",
+    "SceneError",
+    "Sections",
+    "Soil",
+    "Solver",
+    "check",
+    "default_kind",
+    "examine",
+]

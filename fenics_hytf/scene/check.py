@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: MIT
+"""The whole scene, section by section, then what the sections say about each other.
+
+Rules between sections read the raw tables where they can, so that a fault in one section does not
+hide those of another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fenics_hytf.motion import split
+from fenics_hytf.scene.boundary import read_boundary
+from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
+from fenics_hytf.scene.mesh import Mesh, layout, raw_gdim, read_mesh
+from fenics_hytf.scene.motion import MotionInput, read_motions
+from fenics_hytf.scene.settings import (
+    Effects,
+    Lapses,
+    Output,
+    Points,
+    Solver,
+    read_output,
+)
+from fenics_hytf.scene.soil import Soil, read_curves, read_soils
+from fenics_hytf.scene.table import number, read_table, unknown_key
+
+SECTIONS = (
+    "title",
+    "mesh",
+    "soil",
+    "motion",
+    "boundary",
+    "lapses",
+    "effects",
+    "points",
+    "solver",
+    "output",
+)
+
+
+@dataclass
+class Sections:
+    """The sections of a scene; ``None`` where one has a fault.
+
+    Attributes:
+        data: The raw table.
+        folder: Where relative paths start, absolute.
+        title: Title, empty if none is given.
+        mesh: ``[mesh]``.
+        soil: ``[soil.NAME]`` by name, ``None`` for a soil with a fault.
+        motion: ``[[motion]]``, read and scaled, ``None`` for a motion with a fault.
+        boundary: Kinds of the boundaries that the scene names.
+        lapses: ``[lapses]``.
+        effects: ``[effects]``.
+        points: ``[points]``.
+        solver: ``[solver]``.
+        output: ``[output]``.
+    """
+
+    data: dict[str, Any]
+    folder: Path
+    title: str | None = None
+    mesh: Mesh | None = None
+    soil: dict[str, Soil | None] = field(default_factory=dict)
+    motion: tuple[MotionInput | None, ...] = ()
+    boundary: dict[str, str] | None = None
+    lapses: Lapses | None = None
+    effects: Effects | None = None
+    points: Points | None = None
+    solver: Solver | None = None
+    output: Output | None = None
+
+
+def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
+    """Check a scene whole.
+
+    Args:
+        data: The raw table of the scene file.
+        folder: Where relative paths start.
+
+    Returns:
+        The sections that are valid; and every fault, in the order of the sections.
+    """
+    folder = Path(folder).absolute()
+    if not isinstance(data, dict):
+        return Sections({}, folder), [Fault("the scene", toml_text(data), "a table of sections")]
+    raw = {str(name): value for name, value in data.items()}
+    # numbers near the largest overflow in places; what comes of it is refused as not finite
+    with np.errstate(all="ignore"):
+        sections, faults = _read_sections(raw, folder)
+        faults += _unknown_sections(raw)
+        faults += _soil_rules(raw, sections)
+        faults += _time_rules(raw, sections)
+        faults += _damping_rules(raw, sections)
+    order = {name: i for i, name in enumerate(SECTIONS)}
+    faults.sort(key=lambda fault: order.get(fault.key.split(".")[0].split("[")[0], -1))
+    return sections, faults
+
+
+def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fault]]:
+    """Each section on its own."""
+    sections = Sections(raw, folder)
+    faults: list[Fault] = []
+    title = raw.get("title", "")
+    if isinstance(title, str):
+        sections.title = title
+    else:
+        faults.append(Fault("title", toml_text(title), "a string"))
+    sections.mesh, found = read_mesh(raw.get("mesh"), folder)
+    faults += found
+    sections.soil, found = read_soils(raw.get("soil"))
+    faults += found
+    gdim, drawn = raw_gdim(raw.get("mesh")), layout(raw.get("mesh"))
+    sections.motion, found = read_motions(raw.get("motion"), folder, gdim)
+    faults += found
+    names = None if drawn is None else drawn.boundaries
+    sections.boundary, found = read_boundary(raw.get("boundary", {}), names)
+    faults += found
+    sections.lapses, found = read_table(Lapses, raw.get("lapses", {}), "lapses")
+    faults += found
+    sections.effects, found = read_table(Effects, raw.get("effects", {}), "effects")
+    faults += found
+    sections.points, found = read_table(Points, raw.get("points", {}), "points")
+    faults += found
+    sections.solver, found = read_table(Solver, raw.get("solver", {}), "solver")
+    faults += found
+    size = None if drawn is None else drawn.size
+    sections.output, found = read_output(raw.get("output", {}), gdim, size)
+    return sections, faults + found
+
+
+def _unknown_sections(raw: dict[str, Any]) -> Iterator[Fault]:
+    for name, value in raw.items():
+        if name not in SECTIONS:
+            yield unknown_key(name_key(name), value, name, list(SECTIONS))
+
+
+def _soil_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
+    """Layers and regions name soils that there are; several soils in a box need regions."""
+    mesh, soils = raw.get("mesh"), sections.soil
+    if not isinstance(mesh, dict) or not soils:
+        return
+    for key, name in _named_soils(mesh):
+        if name not in soils:
+            yield Fault(key, toml_text(name), f"one of the soils {', '.join(map(name_key, soils))}")
+    lone = mesh.get("box") is None or mesh.get("column") is not None
+    if not lone and not mesh.get("regions") and len(soils) > 1:
+        names = ", ".join(map(name_key, soils))
+        yield Fault("mesh.regions", "nothing", f"which soil is where; there are {names}")
+
+
+def _named_soils(mesh: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Keys of a raw mesh table that name a soil, and the names."""
+    column = mesh.get("column")
+    layers = column.get("layers") if isinstance(column, dict) else None
+    for place, parts in (("column.layers", layers), ("regions", mesh.get("regions"))):
+        for i, part in enumerate(parts if isinstance(parts, list | tuple) else ()):
+            name = part.get("soil") if isinstance(part, dict) else None
+            if isinstance(name, str) and name:
+                yield join_key("mesh", place, i, "soil"), name
+
+
+def _time_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
+    """Lapses of at least two samples; no line above the Nyquist frequency."""
+    read = [motion.record for motion in sections.motion if motion is not None]
+    if not read:
+        return
+    dt = read[0].dt
+    solver = raw["solver"] if isinstance(raw.get("solver"), dict) else {}
+    if sections.lapses is not None and None not in sections.motion:
+        yield from _lapse_rules(sections.lapses, max(r.num_samples for r in read), dt)
+    highest = number(solver, "max_frequency")
+    nyquist = 0.5 / dt
+    # a Nyquist frequency written with the digits of dt may be off by rounding
+    if highest is not None and highest > nyquist * (1 + 1e-9):
+        expected = f"at most {nyquist:g} Hz, the Nyquist frequency of the motion"
+        yield Fault("solver.max_frequency", toml_text(solver["max_frequency"]), expected)
+
+
+def _lapse_rules(lapses: Lapses, num_samples: int, dt: float) -> Iterator[Fault]:
+    """The motion can be cut as asked for."""
+    name = "count" if lapses.duration is None else "duration"
+    try:
+        split(num_samples, dt, count=lapses.count, duration=lapses.duration)
+    except (ValueError, OverflowError) as error:
+        key = join_key("lapses", name)
+        yield fault_from(error, key, toml_text(getattr(lapses, name)))
+
+
+def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
+    """Damping below 0.5 with Dormieux's modulus; curves for the equivalent-linear loop."""
+    soils = raw.get("soil")
+    if not isinstance(soils, dict):
+        return
+    solver, effects = raw.get("solver"), raw.get("effects")
+    if isinstance(solver, dict) and solver.get("complex_modulus") == "dormieux":
+        for name, soil in soils.items():
+            yield from _dormieux(soil, join_key("soil", name_key(name)))
+    loop = effects.get("equivalent_linear", False) if isinstance(effects, dict) else False
+    if loop is False or loop is None:
+        return
+    drawn = layout(raw.get("mesh"))
+    used = (drawn.soil_names if drawn is not None else ()) or tuple(soils)
+    if not used or any(name not in soils for name in used):
+        return
+    if not any(isinstance(soils[name], dict) and "curves" in soils[name] for name in used):
+        expected = f"curves in one of the soils {', '.join(map(name_key, used))}"
+        yield Fault("effects.equivalent_linear", "no soil with curves", expected)
+
+
+def _dormieux(raw: object, key: str) -> Iterator[Fault]:
+    """G(sqrt(1 - 4 D^2) + 2 i D) needs D below one half, of the curve at every strain."""
+    if not isinstance(raw, dict):
+        return
+    expected = 'below 0.5 with complex_modulus = "dormieux"'
+    damping = number(raw, "damping")
+    if damping is not None and 0.5 <= damping < 1:
+        yield Fault(join_key(key, "damping"), toml_text(damping), f"a damping ratio {expected}")
+    curves = raw.get("curves")
+    curve = read_curves(curves, "curves")[0] if isinstance(curves, dict) else None
+    if curve is not None and float(curve.damping.max()) >= 0.5:
+        found = f"damping up to {float(curve.damping.max()):g}"
+        yield Fault(join_key(key, "curves"), found, f"damping ratios {expected}")

@@ -1,0 +1,306 @@
+# SPDX-License-Identifier: MIT
+"""The sections that say how: lapses, effects, points, solver and output."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field
+
+from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
+from fenics_hytf.scene.table import (
+    Count,
+    NotNegative,
+    Positive,
+    Several,
+    Table,
+    at_most_one,
+    number,
+    read_table,
+)
+
+_RECEIVER_NAME = re.compile(r"[\w-]+")
+
+
+class Lapses(Table):
+    """How the motion is cut.
+
+    Attributes:
+        count: Number of lapses, or ``None`` where ``duration`` is given.
+        duration: Length of a lapse [s], or ``None``.
+        continuity: ``steady``: each lapse is its own periodic steady state.
+    """
+
+    count: Count | None = Field(None, description="a whole number from 1")
+    duration: Positive | None = Field(None, description="a positive time [s]")
+    continuity: Literal["steady"] = Field("steady", description='"steady"')
+
+    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "continuity": {"transient": '"steady" is'}
+    }
+
+    @classmethod
+    def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
+        """``count`` and ``duration`` exclude each other."""
+        yield from at_most_one(raw, key, "count", "duration")
+
+    @classmethod
+    def prepare(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """One lapse unless something else is asked for."""
+        return raw if raw.get("duration") is not None else {"count": 1, **raw}
+
+
+class EquivalentLinear(Table):
+    """Shear modulus and damping that fit the strain.
+
+    Attributes:
+        tolerance: On ``|G_new - G_old|/G_new`` and ``|dD|/D`` of every cell [-].
+        strain_ratio: Effective over peak strain [-]; from ``magnitude`` where that is given.
+        magnitude: Moment magnitude M, for the ratio (M - 1)/10 (Idriss & Sun 1992); or ``None``.
+        max_iterations: After which the loop gives up and says so.
+        strain: ``plane``: the in-plane shear strain in 2D; ``3d``: with zero as third principal.
+    """
+
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        1e-3, description="a number between 0 and 1 [-]"
+    )
+    strain_ratio: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.65, description="a number above 0, at most 1 [-]"
+    )
+    magnitude: Annotated[float, Field(gt=1, le=11)] | None = Field(
+        None, description="a magnitude above 1, at most 11; the strain ratio is (M - 1)/10"
+    )
+    max_iterations: Count = Field(50, description="a whole number from 1")
+    strain: Literal["plane", "3d"] = Field("plane", description='"plane" or "3d"')
+
+    @classmethod
+    def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
+        """``strain_ratio`` and ``magnitude`` exclude each other."""
+        yield from at_most_one(raw, key, "strain_ratio", "magnitude")
+
+    @classmethod
+    def prepare(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """The strain ratio from the magnitude."""
+        magnitude = number(raw, "magnitude")
+        if magnitude is None or not 1 < magnitude <= 11 or "strain_ratio" in raw:
+            return raw
+        return {**raw, "strain_ratio": (magnitude - 1) / 10}
+
+
+class Rayleigh(Table):
+    """Viscous damping C = alpha M + beta K.
+
+    Attributes:
+        alpha: [1/s].
+        beta: [s].
+    """
+
+    alpha: NotNegative = Field(0.0, description="a number not below 0 [1/s]")
+    beta: NotNegative = Field(0.0, description="a number not below 0 [s]")
+
+
+_THIS_EFFECTS = "equivalent_linear, rayleigh, geometric_stiffness and convection are"
+
+
+class Effects(Table):
+    """What the scene calls for; what is absent costs nothing.
+
+    Attributes:
+        equivalent_linear: The loop's settings, or ``None``: linear.
+        rayleigh: Its factors, or ``None``.
+        geometric_stiffness: Stiffness from the stress that the points carry.
+        convection: Points move between lapses.
+    """
+
+    equivalent_linear: EquivalentLinear | None = Field(None, description="a table, true or false")
+    rayleigh: Rayleigh | None = Field(None, description="a table with alpha and beta, or false")
+    geometric_stiffness: bool = Field(False, description="true or false")
+    convection: bool = Field(False, description="true or false")
+
+    later: ClassVar[Mapping[str, str]] = dict.fromkeys(
+        ("gravity", "sliding", "softening", "degradation", "locking", "calm", "k0"), _THIS_EFFECTS
+    )
+
+    @classmethod
+    def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
+        """Rules of the tables below."""
+        if isinstance(raw.get("equivalent_linear"), dict):
+            where = join_key(key, "equivalent_linear")
+            yield from EquivalentLinear.rules(raw["equivalent_linear"], where)
+
+    @classmethod
+    def prepare(cls, raw: dict[str, Any]) -> dict[str, Any]:
+        """``true`` is a table of defaults, ``false`` none; Rayleigh factors of zero are none."""
+        raw = dict(raw)
+        loop, rayleigh = raw.get("equivalent_linear"), raw.get("rayleigh")
+        if isinstance(loop, bool):
+            raw["equivalent_linear"] = {} if loop else None
+        elif isinstance(loop, dict):
+            raw["equivalent_linear"] = EquivalentLinear.prepare(loop)
+        factors = (
+            [rayleigh.get(n, 0.0) for n in Rayleigh.model_fields]
+            if (isinstance(rayleigh, dict) and set(rayleigh) <= set(Rayleigh.model_fields))
+            else None
+        )
+        if rayleigh is False or (factors and all(_is_zero(f) for f in factors)):
+            raw["rayleigh"] = None
+        return raw
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the effects that are on, in the order of the file's documentation."""
+        return tuple(name for name in type(self).model_fields if getattr(self, name))
+
+
+class Points(Table):
+    """Material points.
+
+    Attributes:
+        outside: What happens to a point that leaves the mesh: ``error``, ``park`` or ``delete``.
+    """
+
+    outside: Literal["error", "park", "delete"] = Field(
+        "error", description='"error", "park" or "delete"'
+    )
+
+
+class Solver(Table):
+    """How the lines are solved.
+
+    Attributes:
+        sweep: ``direct``: one factorisation a line.
+        complex_modulus: Convention of the complex modulus.
+        keep: ``poisson``: the whole elasticity tensor is complex; ``bulk``: its deviator only.
+        tolerance: Relative residual on every excited line [-].
+        max_frequency: Highest line solved [Hz]; ``None`` for the Nyquist frequency.
+        excited: A line is excited above this fraction of the spectral peak [-].
+    """
+
+    sweep: Literal["direct"] = Field("direct", description='"direct"')
+    complex_modulus: Literal["hysteretic", "kramer", "shake91", "dormieux"] = Field(
+        "hysteretic", description='"hysteretic", "kramer", "shake91" or "dormieux"'
+    )
+    keep: Literal["poisson", "bulk"] = Field("poisson", description='"poisson" or "bulk"')
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        1e-6, description="a number between 0 and 1 [-]"
+    )
+    max_frequency: Positive | None = Field(None, description="a positive number [Hz]")
+    excited: Annotated[float, Field(ge=0, lt=1)] = Field(
+        1e-8, description="a number from 0 to below 1 [-]"
+    )
+
+    later: ClassVar[Mapping[str, str]] = {
+        "reference_frequency": 'it belongs to complex_modulus = "maxwell"'
+    }
+    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "sweep": {"reduced": '"direct" is'},
+        "complex_modulus": {"maxwell": "hysteretic, kramer, shake91 and dormieux are"},
+    }
+
+
+class Receiver(Table):
+    """A place whose motion is written.
+
+    Attributes:
+        place: [m], shape ``(gdim,)``.
+        rides: Whether it rides the material point nearest to the place at the start.
+    """
+
+    place: Several[float] = Field(
+        min_length=2, max_length=3, description="a place [x, y] or [x, y, z] [m]"
+    )
+    rides: bool = Field(False, description="true or false")
+
+
+class Output(Table):
+    """What is written.
+
+    Attributes:
+        receivers: By name. Names become columns such as ``NAME.u_x``, so they are made of
+            letters, digits, ``_`` and ``-``.
+        fields: Whether nodal fields are written.
+        every: Snapshots every so many lapses.
+    """
+
+    receivers: dict[str, Receiver] = Field({}, description="a table of places")
+    fields: bool = Field(False, description="true or false")
+    every: Count = Field(1, description="a whole number from 1")
+
+
+def read_output(
+    raw: object,
+    gdim: int | None,
+    size: tuple[float, ...] | None,
+    key: str = "output",
+) -> tuple[Output | None, list[Fault]]:
+    """Read ``[output]``; each receiver on its own.
+
+    Args:
+        raw: What stands in the file.
+        gdim: Dimension of the mesh, or ``None`` where only the mesh file knows.
+        size: Extent of a column or box from the origin [m], or ``None``.
+        key: Where it stands.
+
+    Returns:
+        The section, or ``None`` if it has a fault; and its faults.
+    """
+    if not isinstance(raw, dict):
+        return read_table(Output, raw, key)
+    output, faults = read_table(Output, {**raw, "receivers": {}}, key)
+    receivers: dict[str, Receiver] = {}
+    table = raw.get("receivers", {})
+    if not isinstance(table, dict):
+        faults.append(Fault(join_key(key, "receivers"), toml_text(table), "a table of places"))
+        table = {}
+    for name, place in table.items():
+        where = join_key(key, "receivers", name_key(name))
+        if not _RECEIVER_NAME.fullmatch(str(name)):
+            faults.append(Fault(where, toml_text(name), "a name of letters, digits, _ and - only"))
+        receiver, found = _read_receiver(place, where)
+        faults += found
+        if receiver is not None:
+            faults += _place_faults(receiver, gdim, size, where)
+            receivers[str(name)] = receiver
+    if output is None or faults:
+        return None, faults
+    return output.model_copy(update={"receivers": receivers}), []
+
+
+def _place_faults(
+    receiver: Receiver, gdim: int | None, size: tuple[float, ...] | None, key: str
+) -> Iterator[Fault]:
+    """A receiver has as many coordinates as the mesh and is inside it."""
+    place, key = receiver.place, join_key(key, "point") if receiver.rides else key
+    found = toml_text(place)
+    if gdim is not None and len(place) != gdim:
+        yield Fault(key, found, f"{gdim} coordinates, as the mesh is {gdim}D [m]")
+    elif size is not None:
+        # heights summed from decimal thicknesses are off by rounding (1e-16 a layer)
+        slack = 1e-9 * max(size)
+        if any(not -slack <= p <= s + slack for p, s in zip(place, size, strict=True)):
+            corner = ", ".join(f"{s:g}" for s in size)
+            yield Fault(key, found, f"a place inside the mesh, from 0 to ({corner}) m")
+
+
+def _read_receiver(raw: object, key: str) -> tuple[Receiver | None, list[Fault]]:
+    """A receiver from ``[x, y]`` or ``{ point = [x, y] }``."""
+    expected = "a place [x, y] or [x, y, z] [m], or { point = [x, y] }"
+    rides = isinstance(raw, dict)
+    place = raw
+    if isinstance(raw, dict):
+        if list(raw) != ["point"]:
+            return None, [Fault(key, toml_text(raw), expected)]
+        place, key = raw["point"], join_key(key, "point")
+    if not isinstance(place, list | tuple) or len(place) not in (2, 3):
+        return None, [Fault(key, toml_text(place), expected)]
+    receiver, faults = read_table(Receiver, {"place": place, "rides": rides}, key)
+    return receiver, [
+        Fault(fault.key.replace(join_key(key, "place"), key, 1), fault.found, "a number [m]")
+        for fault in faults
+    ]
+
+
+def _is_zero(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and value == 0

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: MIT
+"""The ``[soil.NAME]`` tables: elastic constants, damping, curves and strength of each soil."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
+from fenics_hytf.scene.table import (
+    NAME,
+    Fraction,
+    NotNegative,
+    Positive,
+    Table,
+    as_number,
+    exactly_one,
+    read_table,
+)
+from fenics_hytf.soil import Curve, Elastic, curve_from_model
+
+MODULI = ("shear_wave_velocity", "shear_modulus", "youngs_modulus")
+_TABLE = ("strain", "modulus", "damping")
+
+
+class Soil(Table):
+    """One soil.
+
+    Attributes:
+        density: Mass density [kg/m^3].
+        shear_wave_velocity: [m/s]; exactly one of the three moduli is not ``None``.
+        shear_modulus: [Pa].
+        youngs_modulus: [Pa].
+        poisson: Poisson's ratio [-].
+        damping: Damping ratio without curves [-], or ``None``.
+        curves: The raw table of curves, or ``None``; see :attr:`curve`.
+        friction_angle: [degrees], or ``None``.
+        cohesion: [Pa], or ``None``.
+    """
+
+    density: Positive = Field(description="a positive number [kg/m3]")
+    shear_wave_velocity: Positive | None = Field(None, description="a positive number [m/s]")
+    shear_modulus: Positive | None = Field(None, description="a positive number [Pa]")
+    youngs_modulus: Positive | None = Field(None, description="a positive number [Pa]")
+    poisson: Annotated[float, Field(ge=0, lt=0.5)] = Field(
+        description="a number from 0 to below 0.5 [-]"
+    )
+    damping: Fraction | None = Field(None, description="a damping ratio from 0 to below 1 [-]")
+    curves: dict[str, Any] | None = Field(
+        None, description="a table with model and its parameters, or strain, modulus and damping"
+    )
+    friction_angle: Annotated[float, Field(ge=0, lt=90)] | None = Field(
+        None, description="an angle from 0 to below 90 [degrees]"
+    )
+    cohesion: NotNegative | None = Field(None, description="a number not below 0 [Pa]")
+
+    @classmethod
+    def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
+        """One modulus; curves that are curves."""
+        yield from exactly_one(raw, key, *MODULI)
+        if isinstance(raw.get("curves"), dict):
+            yield from read_curves(raw["curves"], join_key(key, "curves"))[1]
+
+    @cached_property
+    def elastic(self) -> Elastic:
+        """The small-strain elastic constants."""
+        moduli = {name: getattr(self, name) for name in MODULI if getattr(self, name) is not None}
+        return Elastic.from_constants(density=self.density, poisson=self.poisson, **moduli)
+
+    @cached_property
+    def curve(self) -> Curve | None:
+        """G/G_max and damping against strain, or ``None``."""
+        if self.curves is None:
+            return None
+        return read_curves(self.curves, "curves")[0]
+
+    def damping_ratio(self, with_curves: bool) -> float:
+        """Damping ratio at small strain [-].
+
+        Args:
+            with_curves: Whether the curves rule (the scene is equivalent linear). If not,
+                ``damping`` holds.
+
+        Returns:
+            The curve's value at its smallest strain where the curves rule or no ``damping`` is
+            given; ``damping`` otherwise; 0 if the soil has neither.
+        """
+        if self.curve is not None and (with_curves or self.damping is None):
+            return self.curve.small_strain_damping
+        return 0.0 if self.damping is None else self.damping
+
+
+def read_soils(raw: object, key: str = "soil") -> tuple[dict[str, Soil | None], list[Fault]]:
+    """Read all soils.
+
+    Args:
+        raw: What stands in the file, a table of tables.
+        key: Where it stands.
+
+    Returns:
+        The soils by name, ``None`` where one has a fault; and the faults.
+    """
+    if not isinstance(raw, dict) or not raw:
+        return {}, [Fault(key, toml_text(raw), "at least one table [soil.NAME]")]
+    soils: dict[str, Soil | None] = {}
+    faults: list[Fault] = []
+    for name, table in raw.items():
+        where = join_key(key, name_key(name))
+        soil, found = read_table(Soil, table, where)
+        if not NAME.fullmatch(str(name)):
+            found.append(Fault(where, toml_text(name), "a name without comma, quote or new line"))
+        if soil is not None:
+            try:
+                _ = soil.elastic
+            except (ValueError, ArithmeticError) as error:
+                found = [fault_from(error, where, toml_text(table))]
+        soils[str(name)] = None if found else soil
+        faults += found
+    return soils, faults
+
+
+def read_curves(raw: dict[str, Any], key: str) -> tuple[Curve | None, list[Fault]]:
+    """Build the curves of a soil.
+
+    Args:
+        raw: ``model`` and its parameters, or ``strain``, ``modulus`` and ``damping``.
+        key: Where it stands.
+
+    Returns:
+        The curve, or ``None`` if there is a fault; and the faults.
+    """
+    if "model" in raw:
+        faults = [
+            Fault(join_key(key, name), toml_text(raw[name]), "no table beside a model")
+            for name in ("modulus", "damping")
+            if name in raw
+        ]
+        return (None, faults) if faults else _from_model(raw, key)
+    faults = [
+        Fault(join_key(key, name_key(name)), toml_text(value), "model, or strain, modulus, damping")
+        for name, value in raw.items()
+        if name not in _TABLE
+    ]
+    columns: dict[str, list[float]] = {}
+    for name in _TABLE:
+        numbers = _numbers(raw.get(name))
+        if numbers is None:
+            faults.append(_no_numbers(raw.get(name), join_key(key, name)))
+        else:
+            columns[name] = numbers
+    for name, numbers in columns.items():
+        faults += _column_faults(name, numbers, raw, key)
+    return (None, faults) if faults else _built(lambda: _curve(**columns), raw, key)
+
+
+def _curve(strain: list[float], modulus: list[float], damping: list[float]) -> Curve:
+    return Curve(np.array(strain), np.array(modulus), np.array(damping))
+
+
+def _column_faults(name: str, numbers: list[float], raw: dict[str, Any], key: str) -> list[Fault]:
+    """Faults of one column, whatever the others hold: those beside it are made up."""
+    size = len(numbers)
+    columns = {
+        "strain": [float(i + 1) for i in range(size)],
+        "modulus": [1.0] * size,
+        "damping": [0.0] * size,
+    }
+    return _built(lambda: _curve(**columns | {name: numbers}), raw, key)[1] if size > 1 else []
+
+
+def _from_model(raw: dict[str, Any], key: str) -> tuple[Curve | None, list[Fault]]:
+    """A curve by the name of its model."""
+    model = raw["model"]
+    if not isinstance(model, str):
+        return None, [Fault(join_key(key, "model"), toml_text(model), "the name of a model")]
+    parameters = {str(name): value for name, value in raw.items() if name != "model"}
+    faults = [
+        Fault(join_key(key, name_key(name)), toml_text(value), "a finite number")
+        for name, value in parameters.items()
+        if as_number(value) is None and _numbers(value) is None
+    ]
+    if faults:
+        return None, faults
+    return _built(lambda: curve_from_model(model, **parameters), raw, key)
+
+
+def _built(
+    build: Callable[[], Curve], raw: dict[str, Any], key: str
+) -> tuple[Curve | None, list[Fault]]:
+    """A curve, or the fault of building it; parameters may be so odd that arithmetic fails."""
+    try:
+        with np.errstate(all="ignore"):
+            return build(), []
+    except (ValueError, TypeError, ArithmeticError) as error:
+        return None, [fault_from(error, key, toml_text(raw))]
+
+
+def _numbers(values: object) -> list[float] | None:
+    """A raw array of finite numbers, or ``None`` if it is none."""
+    if not isinstance(values, list | tuple):
+        return None
+    numbers = [as_number(value) for value in values]
+    return [n for n in numbers if n is not None] if None not in numbers else None
+
+
+def _no_numbers(values: object, key: str) -> Fault:
+    """The fault of a column that is no array of numbers, at the item that is none."""
+    if isinstance(values, list | tuple):
+        at = next(i for i, value in enumerate(values) if as_number(value) is None)
+        return Fault(join_key(key, at), toml_text(values[at]), "a finite number [-]")
+    return Fault(key, toml_text(values), "an array of numbers [-]")
