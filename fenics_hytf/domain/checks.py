@@ -9,7 +9,49 @@ import numpy.typing as npt
 from dolfinx.mesh import Mesh
 
 from fenics_hytf import _compat
+from fenics_hytf.domain.grids import MeshData
 from fenics_hytf.scene import Fault, SceneError
+
+
+def refuse_tangled_cells(data: MeshData) -> None:
+    """Raise where cells do not make a mesh: dolfinx would crash on them.
+
+    Args:
+        data: The mesh.
+
+    Raises:
+        SceneError: A cell that repeats a node, two cells of the same nodes, or more than two at one
+            facet; names the first.
+    """
+    found = _tangle(data)
+    if found:
+        expected = "a mesh in which at most two cells meet at a facet; repair it in its generator"
+        raise SceneError([Fault("mesh.file", found, expected)])
+
+
+def _tangle(data: MeshData) -> str:
+    """What is wrong with the way the cells hang together; empty if nothing is."""
+    cell_type = getattr(basix.CellType, data.cell_type)
+    corners = data.cells[:, : len(basix.geometry(cell_type))]
+    ordered = np.sort(corners, axis=1)
+    repeated = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+    if len(repeated):
+        return f"cell {repeated[0]} with a node twice"
+    twins = _equal_rows(ordered, 2)
+    if len(twins):
+        return f"cells {' and '.join(map(str, twins))} of the same nodes"
+    facets = np.array(basix.topology(cell_type)[-2])
+    meeting = _equal_rows(np.sort(corners[:, facets].reshape(-1, facets.shape[1]), axis=1), 3)
+    if len(meeting):
+        return f"cells {', '.join(str(f // len(facets)) for f in meeting)} at one facet"
+    return ""
+
+
+def _equal_rows(rows: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64]:
+    """The first rows found of which ``count`` or more are alike, sorted; empty if none are."""
+    order = np.lexsort(rows.T)
+    starts = np.flatnonzero((rows[order[count - 1 :]] == rows[order[: 1 - count]]).all(axis=1))
+    return np.sort(order[starts[0] : starts[0] + count]) if len(starts) else order[:0]
 
 
 def jacobian_determinants(mesh: Mesh, X: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

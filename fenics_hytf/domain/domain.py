@@ -101,8 +101,8 @@ def build(scene: Scene, comm: MPI.Comm) -> Domain:
 
     Raises:
         SceneError: On every rank: an unreadable file, a region without a soil of its name, a
-            boundary that the scene names and the mesh lacks, or a cell with a non-positive
-            Jacobian.
+            boundary that the scene names and the mesh lacks, a motion along an axis that it lacks,
+            or a cell with a non-positive Jacobian.
     """
     data = _on_rank_zero(comm, lambda: _mesh_data(scene))
     mesh = _distribute(data, comm)
@@ -114,7 +114,9 @@ def build(scene: Scene, comm: MPI.Comm) -> Domain:
     header = (data.region_names, data.region) if data else None
     names, region = comm.bcast(header)
     local = region[np.asarray(mesh.topology.original_cell_index, np.int64)]
-    return Domain(mesh, functionspace(mesh, element), names, local, _boundaries(mesh, data, comm))
+    boundaries = _boundaries(mesh, data, comm)
+    _require_facets(boundaries, ("base", *scene.boundary), comm)
+    return Domain(mesh, functionspace(mesh, element), names, local, boundaries)
 
 
 def _on_rank_zero(comm: MPI.Comm, make: Callable[[], MeshData]) -> MeshData | None:
@@ -142,15 +144,21 @@ def _mesh_data(scene: Scene) -> MeshData:
     missing = [name for name in data.region_names if name not in soils]
     if missing:
         faults.append(Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each"))
-    known = ", ".join(data.facets) or "physical groups of facets (the mesh has none)"
+    names = (*data.planes, *data.facets)
+    known = ", ".join(names)
     for name in scene.boundary:
-        if name not in data.facets:
+        if name not in names:
             faults.append(Fault(f"boundary.{name}", "no such boundary in the mesh", known))
-    if "base" not in data.facets and not {"rigid", "fixed"} & set(scene.boundary.values()):
+    if "base" not in names and not {"rigid", "fixed"} & set(scene.boundary.values()):
         expected = "a boundary named 'base', or one that the scene calls rigid"
         faults.append(Fault("boundary", f"none that is held among {known}", expected))
-    if scene.mesh.kinematics and data.points.shape[1] == 3:
+    gdim = data.points.shape[1]
+    if scene.mesh.kinematics and gdim == 3:
         faults.append(Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh"))
+    for number, motion in enumerate(scene.motion):
+        if motion.direction not in "xyz"[:gdim]:
+            expected = f"{' or '.join('xyz'[:gdim])}: the mesh has {gdim} dimensions"
+            faults.append(Fault(f"motion[{number}].direction", f'"{motion.direction}"', expected))
     if faults:
         raise SceneError(faults)
     return data
@@ -189,3 +197,15 @@ def _boundaries(
         width = comm.bcast(nodes.shape[1])
         found[name] = _compat.find_entities(mesh, fdim, nodes.reshape(-1, width))
     return found
+
+
+def _require_facets(
+    boundaries: dict[str, npt.NDArray[np.int32]], names: tuple[str, ...], comm: MPI.Comm
+) -> None:
+    """Raise on every rank where a boundary that counts has no facet of the mesh."""
+    bare = [n for n in boundaries if n in names and not comm.allreduce(len(boundaries[n]))]
+    if bare:
+        expected = "a boundary made of sides of the mesh's cells"
+        raise SceneError(
+            [Fault(f"boundary.{name}", "no side of a cell", expected) for name in bare]
+        )

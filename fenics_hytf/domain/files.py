@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: MIT
 """Meshes from files: gmsh's ``.msh``, or anything meshio reads, with named regions and boundaries.
 
-Physical groups (gmsh) or cell sets (Abaqus, MED ...) of the mesh's dimension are regions and carry
-the names of soils; those one dimension lower are boundaries.
+Physical groups (gmsh), sets (Abaqus ...) or families (MED) of the mesh's dimension are regions and
+carry the names of soils; those one dimension lower are boundaries. A file that names no boundary
+has those of a box: the sides of the box around the mesh.
 """
 
 from __future__ import annotations
 
+import io
+import logging
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
 import meshio
@@ -14,8 +18,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf import _compat
-from fenics_hytf.domain.grids import MeshData
+from fenics_hytf.domain.checks import refuse_tangled_cells
+from fenics_hytf.domain.grids import MeshData, box_sides
 from fenics_hytf.scene import Fault, SceneError
+
+_logger = logging.getLogger(__name__)
 
 # meshio's name: dolfinx's name, dimension, degree, type of its facets
 _CELLS = {
@@ -43,50 +50,86 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
         The mesh, its unused nodes dropped.
 
     Raises:
-        SceneError: The file cannot be read, holds no cells or several types of them, or has cells
-            outside every region.
+        SceneError: The file cannot be read, holds no cells, several types of them or such as do not
+            make a mesh, or has cells outside every region.
     """
-    try:
-        raw = meshio.read(path)
-    except SystemExit as error:  # meshio's way of refusing an unknown ending
-        raise _fault(path.name, "a format that meshio reads") from error
-    except Exception as error:  # meshio raises many kinds
-        found = f"{path.name}, not readable ({type(error).__name__}: {error})"
-        raise _fault(found, "a gmsh .msh file or another format that meshio reads") from error
+    raw = _read(path)
     kind = _cell_kind(raw, path)
     name, gdim, degree, facet_kind = _CELLS[kind]
     cells = np.concatenate([b.data for b in raw.cells if b.type == kind]).astype(np.int64)
-    points = np.asarray(raw.points, float)
-    if gdim == 2 and points.shape[1] == 3:
-        if np.ptp(points[np.unique(cells), 2]) > 1e-9 * np.ptp(points):
-            raise _fault(
-                f"cells of {path.name} out of the plane z = const", "a 2D mesh in x and y, y up"
-            )
-        points = points[:, :2]
-    region, names = _regions(raw, kind, gdim, len(cells), soils, path)
     used, inverse = np.unique(cells, return_inverse=True)
-    number = np.full(len(points), -1, np.int64)
+    points = _points(raw, used, gdim, path)
+    number = np.full(len(raw.points), -1, np.int64)
     number[used] = np.arange(len(used))
     order = _compat.vtk_permutation(name, cells.shape[1])
     facets = {
         boundary: number[nodes][:, _compat.vtk_permutation(_FACETS[facet_kind], nodes.shape[1])]
-        for boundary, nodes in _groups(raw, facet_kind, gdim - 1).items()
+        for boundary, nodes in _boundaries(raw, facet_kind, gdim - 1).items()
     }
     facets = {k: f[(f >= 0).all(axis=1)] for k, f in facets.items()}
-    return MeshData(
-        points[used],
+    region, names = _regions(raw, kind, gdim, soils, path)
+    data = MeshData(
+        points,
         inverse.reshape(cells.shape)[:, order],
         name,
         degree,
         region,
         names,
-        {},
+        {} if facets else _box_around(points, path),
         facets,
     )
+    refuse_tangled_cells(data)
+    return data
+
+
+def _read(path: Path) -> meshio.Mesh:
+    said = io.StringIO()
+    expected = (
+        "a gmsh .msh file, every cell in a physical group or none, or another format that meshio "
+        "reads"
+    )
+    try:
+        with redirect_stdout(said), redirect_stderr(said):  # meshio prints
+            raw = meshio.read(path)
+    except SystemExit as error:  # meshio's way of refusing a file
+        reason = " ".join(said.getvalue().split())
+        raise _fault(f"{path.name}, not readable ({reason})", expected) from error
+    except Exception as error:  # meshio raises many kinds
+        found = f"{path.name}, not readable ({type(error).__name__}: {error})"
+        raise _fault(found, expected) from error
+    if said.getvalue().strip():
+        _logger.info("%s: %s", path.name, said.getvalue().strip())
+    return raw
+
+
+def _points(
+    raw: meshio.Mesh, used: npt.NDArray[np.int64], gdim: int, path: Path
+) -> npt.NDArray[np.float64]:
+    """Coordinates of the nodes that cells use [m], shape ``(len(used), gdim)``."""
+    if used[0] < 0 or used[-1] >= len(raw.points):
+        raise _fault(f"cells of {path.name} with nodes that it does not hold", "a whole mesh")
+    points = np.asarray(raw.points, float)[used]
+    if not np.isfinite(points).all():
+        bad = used[np.flatnonzero(~np.isfinite(points).all(axis=1))[0]]
+        raise _fault(f"node {bad} of {path.name} at {raw.points[bad]}", "finite coordinates [m]")
+    if points.shape[1] > gdim and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
+        found = f"cells of {path.name} out of the plane z = const"
+        raise _fault(found, "a 2D mesh in x and y, y up")
+    return points[:, :gdim]
 
 
 def _fault(found: str, expected: str) -> SceneError:
     return SceneError([Fault("mesh.file", found, expected)])
+
+
+def _box_around(points: npt.NDArray[np.float64], path: Path) -> dict[str, tuple[int, float]]:
+    """Boundaries of a mesh whose file names none: the sides of the box around it."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    floor = points[points[:, -1] <= low[-1] + 1e-12 * np.abs(points).max()][:, :-1]
+    if (floor.min(axis=0) > low[:-1]).any() or (floor.max(axis=0) < high[:-1]).any():
+        found = f"no named boundary in {path.name}, whose lowest side is not level"
+        raise _fault(found, "facets named 'base'")
+    return box_sides(low, high)
 
 
 def _cell_kind(raw: meshio.Mesh, path: Path) -> str:
@@ -105,60 +148,66 @@ def _cell_kind(raw: meshio.Mesh, path: Path) -> str:
     return top.pop()
 
 
-def _groups(raw: meshio.Mesh, kind: str, dim: int) -> dict[str, npt.NDArray[np.int64]]:
-    """Nodes of the entities of each named group, by the group's name."""
-    found: dict[str, list[npt.NDArray[np.int64]]] = {}
+def _members(raw: meshio.Mesh, number: int, dim: int) -> dict[str, npt.NDArray[np.int64]]:
+    """Entities of one block of a dimension, by the name of each group that holds some of them."""
+    found: dict[str, list[npt.NDArray[np.intp]]] = {}
+    # Sets of gmsh's version 4, Abaqus ...; meshio adds one of its own to gmsh's.
+    for name, sets in raw.cell_sets.items():
+        if not name.startswith("gmsh:") and sets[number] is not None:
+            found[name] = [np.asarray(sets[number], np.intp)]
     tags = raw.cell_data.get("gmsh:physical")
+    if tags is not None:  # gmsh's version 2 has no sets
+        for name, (tag, group_dim) in raw.field_data.items():
+            if group_dim == dim and name not in found:
+                found[name] = [np.flatnonzero(tags[number] == tag)]
+    families = raw.cell_data.get("cell_tags")
+    if families is not None:  # MED: each family belongs to any number of groups
+        for family, names in getattr(raw, "cell_tags", {}).items():
+            for name in names:
+                found.setdefault(name, []).append(np.flatnonzero(families[number] == family))
+    joined = {name: np.concatenate(parts).astype(np.int64) for name, parts in found.items()}
+    return {name: members for name, members in joined.items() if len(members)}
+
+
+def _boundaries(raw: meshio.Mesh, kind: str, dim: int) -> dict[str, npt.NDArray[np.int64]]:
+    """Nodes of the facets of each boundary."""
+    found: dict[str, list[npt.NDArray[np.int64]]] = {}
     for number, block in enumerate(raw.cells):
-        if block.type != kind:
-            continue
-        if tags is not None:
-            for name, (tag, group_dim) in raw.field_data.items():
-                if group_dim == dim:
-                    found.setdefault(name, []).append(block.data[tags[number] == tag])
-        else:
-            for name, sets in raw.cell_sets.items():
-                if sets[number] is not None and len(sets[number]):
-                    found.setdefault(name, []).append(block.data[np.asarray(sets[number], int)])
+        if block.type == kind:
+            for name, members in _members(raw, number, dim).items():
+                found.setdefault(name, []).append(block.data[members])
     return {name: np.concatenate(parts).astype(np.int64) for name, parts in found.items()}
 
 
 def _regions(
-    raw: meshio.Mesh, kind: str, dim: int, num_cells: int, soils: tuple[str, ...], path: Path
+    raw: meshio.Mesh, kind: str, dim: int, soils: tuple[str, ...], path: Path
 ) -> tuple[npt.NDArray[np.int32], tuple[str, ...]]:
-    """Region of each cell, in the order of the cells."""
-    tags = raw.cell_data.get("gmsh:physical")
-    region = np.full(num_cells, -1, np.int32)
-    names: list[str] = []
-    offset = 0
+    """Region of each cell, in the order of the cells: its group that is named as a soil."""
+    groups: dict[str, list[npt.NDArray[np.int64]]] = {}
+    num_cells = 0
     for number, block in enumerate(raw.cells):
-        if block.type != kind:
-            continue
-        part = region[offset : offset + len(block.data)]
-        offset += len(block.data)
-        if tags is not None:
-            groups = {
-                name: np.flatnonzero(tags[number] == tag)
-                for name, (tag, group_dim) in raw.field_data.items()
-                if group_dim == dim
-            }
-        else:
-            groups = {
-                name: np.asarray(sets[number], int)
-                for name, sets in raw.cell_sets.items()
-                if sets[number] is not None
-            }
-        for name, members in groups.items():
-            if len(members):
-                if name not in names:
-                    names.append(name)
-                part[members] = names.index(name)
-    if not names and len(soils) == 1:
+        if block.type == kind:
+            for name, members in _members(raw, number, dim).items():
+                groups.setdefault(name, []).append(members + num_cells)
+            num_cells += len(block.data)
+    if not groups and len(soils) == 1:
         return np.zeros(num_cells, np.int32), soils
+    names = sorted(groups, key=lambda name: name in soils)  # soils last: they win
+    region = np.full(num_cells, -1, np.int32)
+    for index, name in enumerate(names):
+        members = np.concatenate(groups[name])
+        if name in soils:
+            others = [n for n in names[:index] if n in soils]
+            both = members[np.isin(region[members], [names.index(n) for n in others])]
+            if len(both):
+                found = f"cell {both[0]} of {path.name} in the groups of two soils, {name} the last"
+                raise _fault(found, "one soil a cell")
+        region[members] = index
     bare = np.flatnonzero(region < 0)
     if len(bare):
         raise _fault(
             f"{len(bare)} cells of {path.name} in no named region, the first cell {bare[0]}",
             "a physical group named as a soil around every cell",
         )
-    return region, tuple(names)
+    kept, numbered = np.unique(region, return_inverse=True)
+    return numbered.astype(np.int32), tuple(names[index] for index in kept)

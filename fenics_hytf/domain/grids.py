@@ -74,7 +74,7 @@ def column_mesh(column: Column) -> MeshData:
         1,
         region,
         names,
-        _sides([column.width, column.height]),
+        box_sides(np.zeros(2), np.array([column.width, column.height])),
     )
 
 
@@ -103,15 +103,27 @@ def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
     elif box.cell == "tetrahedron":
         cells = cells[:, np.array(_TETRAHEDRA)].reshape(-1, 4)
     region, names = _regions(points[cells].mean(axis=1), mesh, soils)
-    return MeshData(points, cells, box.cell, 1, region, names, _sides(box.size))
+    sides = box_sides(np.zeros(len(box.size)), np.array(box.size))
+    return MeshData(points, cells, box.cell, 1, region, names, sides)
 
 
-def _sides(size: Sequence[float]) -> dict[str, tuple[int, float]]:
-    """Name the sides of a box with a corner in the origin; the last axis is up."""
-    up = len(size) - 1
-    sides = {"base": (up, 0.0), "top": (up, float(size[up]))}
-    for axis, (low, high) in zip(range(up), (("left", "right"), ("front", "back")), strict=False):
-        sides |= {low: (axis, 0.0), high: (axis, float(size[axis]))}
+def box_sides(
+    low: npt.NDArray[np.float64], high: npt.NDArray[np.float64]
+) -> dict[str, tuple[int, float]]:
+    """Name the sides of a box; the last axis is up.
+
+    Args:
+        low: Its lowest corner [m], shape ``(gdim,)``.
+        high: Its highest corner [m], shape ``(gdim,)``.
+
+    Returns:
+        Axis and place [m] by name.
+    """
+    up = len(low) - 1
+    sides = {"base": (up, float(low[up])), "top": (up, float(high[up]))}
+    pairs = (("left", "right"), ("front", "back"))
+    for axis, (lower, upper) in zip(range(up), pairs, strict=False):
+        sides |= {lower: (axis, float(low[axis])), upper: (axis, float(high[axis]))}
     return sides
 
 

@@ -22,8 +22,8 @@ _PREFIX = "hytf_direct_"
 
 
 # PETSc's own LDLᵀ has no start-up cost: on a column of 192 unknowns it took a quarter of MUMPS'
-# time, on a section of 1640 one and a half times as much; they meet at about 600. It is serial.
-_SMALL = 500
+# time, on a section of 420 two thirds, of 1640 1.2 times as much. It is serial.
+_SMALL = 1000
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class SymmetricFactorisation:
         pc.setType(PETSc.PC.Type.CHOLESKY)
         pc.setFactorSolverType(self._choices[0].name)
         if self._choices[0].name == PETSc.Mat.SolverType.PETSC:
-            pc.setFactorOrdering(PETSc.Mat.OrderingType.RCM)
+            pc.setFactorOrdering(PETSc.Mat.OrderingType.ND)
         return solver
 
     def factorise(self, s: complex) -> None:

@@ -80,12 +80,12 @@ class Excitation:
         """Spectra of the response to all motions together (6).
 
         Args:
-            projected: Transfer functions h, shape ``(num_rows, num_motions, num_lines)``.
+            projected: Transfer functions h, shape ``(..., num_motions, num_lines)``.
 
         Returns:
-            Shape ``(num_rows, num_lines)``.
+            Shape ``(..., num_lines)``.
         """
-        return np.einsum("rmk,mk->rk", projected, self.weights)
+        return np.einsum("...mk,mk->...k", projected, self.weights)
 
     def weights_at(self, time: float) -> ComplexArray:
         """Weights that sum the solutions h to the response at one instant.
@@ -153,8 +153,7 @@ class ReceiverProbe:
         transfer = -(omega**2) * h
         for motion, axis in enumerate(excitation.axes):
             transfer[:, axis, motion] += 1.0
-        u = excitation.respond(h.reshape(-1, *h.shape[2:])).reshape(self._count, gdim, -1)
-        total = excitation.respond(transfer.reshape(-1, *h.shape[2:])).reshape(u.shape)
+        u, total = excitation.respond(h), excitation.respond(transfer)
         return Histories(
             transfer,
             excitation.to_time(u),
@@ -211,7 +210,8 @@ class CellProbe:
         """Strain spectra of a block, shape ``(num_cells, num_strains, num_lines)``."""
         gdim = self._domain.gdim
         spectra = excitation.respond(sweep.project(rows))
-        return spectra.reshape(-1, gdim * (gdim + 1) // 2, spectra.shape[-1])
+        num_strains = gdim * (gdim + 1) // 2
+        return spectra.reshape(len(spectra) // num_strains, num_strains, spectra.shape[-1])
 
     def peak_strain(self, sweep: Sweep, excitation: Excitation) -> RealArray:
         """Largest shear strain of every cell (collective).
@@ -258,8 +258,9 @@ class CellProbe:
     def _total_acceleration(
         self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation
     ) -> RealArray:
+        gdim = self._domain.gdim
         u = excitation.respond(sweep.project(rows))
-        u = u.reshape(-1, self._domain.gdim, u.shape[-1])
+        u = u.reshape(len(u) // gdim, gdim, u.shape[-1])
         total = -(excitation.omega**2) * u
         for motion, axis in enumerate(excitation.axes):
             total[:, axis] += excitation.weights[motion]

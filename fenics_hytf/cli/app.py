@@ -1,0 +1,208 @@
+# SPDX-License-Identifier: MIT
+"""Commands and their options. What is heavy is imported when a command needs it, not before."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+import time
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import click
+import typer
+
+from fenics_hytf.cli.outcome import (
+    INPUT,
+    InputError,
+    RunRequest,
+    launched_rank,
+    not_in_this_version,
+    tell,
+)
+
+app = typer.Typer(
+    name="hytf",
+    help="Ground response with material points, solved in the frequency domain.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+SceneArgument = Annotated[Path, typer.Argument(metavar="SCENE", help="Scene file (TOML).")]
+OutputOption = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Result folder  [./<scene>-result]"),
+]
+MotionOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--motion", metavar="FILE", help="AT2 or CSV file in the place of the first motion."
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Override values of the scene; repeatable."),
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace a finished result.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress, no summary.")]
+PlotsOption = Annotated[bool, typer.Option("--no-plots", help="No figures, no report.")]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="Not in this version.")]
+GroupOption = Annotated[
+    int | None, typer.Option("--group-size", metavar="K", help="Not in this version.")
+]
+
+
+def main(arguments: list[str] | None = None) -> NoReturn:
+    """Run ``hytf`` and leave with its exit code.
+
+    Args:
+        arguments: What follows ``hytf``; the process's own if ``None``.
+    """
+    given = spread_overrides(sys.argv[1:] if arguments is None else arguments)
+    if launched_rank() == 0:
+        app(given, prog_name="hytf")
+        raise AssertionError("typer returns by SystemExit")
+    sys.exit(_run_silently(given))
+
+
+def _run_silently(arguments: list[str]) -> int:
+    """A further rank: it reads the same arguments, and leaves the talking to the first."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere, redirect_stdout(nowhere):
+        try:
+            code = app(arguments, prog_name="hytf", standalone_mode=False) or 0
+        except click.ClickException as error:
+            code = error.exit_code
+    if code and "mpi4py.MPI" not in sys.modules:
+        time.sleep(1.0)  # mpirun ends all ranks when one fails: let the first say why
+    return int(code)
+
+
+def spread_overrides(arguments: list[str]) -> list[str]:
+    """Let one ``--set`` take several ``key=value``: repeat it before each."""
+    spread: list[str] = []
+    follows = False
+    for argument in arguments:
+        if follows and re.match(r"[\w.\[\]\"'-]+=", argument) and not argument.startswith("-"):
+            if spread[-1] != "--set":
+                spread.append("--set")
+        else:
+            follows = argument == "--set"
+        spread.append(argument)
+    return spread
+
+
+@app.callback(invoke_without_command=True)
+def _hytf(
+    version: Annotated[bool, typer.Option("--version", help="Say the version and stop.")] = False,
+) -> None:
+    if version:
+        from fenics_hytf.results.summary import own_version
+
+        typer.echo(f"hytf {own_version()}")
+        raise typer.Exit
+
+
+@app.command()
+def run(
+    scene: SceneArgument,
+    output: OutputOption = None,
+    motion: MotionOption = None,
+    overrides: SetOption = None,
+    force: ForceOption = False,
+    quiet: QuietOption = False,
+    no_plots: PlotsOption = False,
+    resume: ResumeOption = False,
+    group_size: GroupOption = None,
+) -> None:
+    """Run a scene; under mpirun on all ranks."""
+    _refuse_later(resume, group_size)
+    folder = output if output is not None else default_folder(scene)
+    request = RunRequest(scene, folder, motion, tuple(overrides or ()), force, quiet, not no_plots)
+    _leave("run", request)
+
+
+@app.command()
+def check(scene: SceneArgument, motion: MotionOption = None, overrides: SetOption = None) -> None:
+    """Check a scene: its faults, or what running it would take."""
+    request = RunRequest(scene, default_folder(scene), motion, tuple(overrides or ()))
+    _leave("check", request)
+
+
+@app.command()
+def plot(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished result.")],
+) -> None:
+    """Draw the figures and write report.html of a finished result again."""
+    if launched_rank() != 0:
+        return
+    from fenics_hytf.cli.plot import plot_result
+
+    raise typer.Exit(plot_result(folder))
+
+
+@app.command()
+def demo(
+    name: Annotated[str | None, typer.Argument(help="Name of the demo; none: list them.")] = None,
+    output: OutputOption = None,
+    motion: MotionOption = None,
+    overrides: SetOption = None,
+    force: ForceOption = False,
+    quiet: QuietOption = False,
+    no_plots: PlotsOption = False,
+    resume: ResumeOption = False,
+    group_size: GroupOption = None,
+) -> None:
+    """Copy a demo scene into this folder and run it; without NAME, list them."""
+    from fenics_hytf.cli.demos import find_demo, list_demos
+
+    if name is None:
+        typer.echo(list_demos())
+        return
+    _refuse_later(resume, group_size)
+    try:
+        source = find_demo(name)
+    except InputError as error:
+        tell(error.faults)
+        raise typer.Exit(INPUT) from None
+    scene = Path(source.name)
+    folder = output if output is not None else default_folder(scene)
+    settings = (motion, tuple(overrides or ()), force, quiet, not no_plots)
+    _leave("run", RunRequest(scene, folder, *settings, demo=source))
+
+
+@app.command()
+def accuracy(scene: SceneArgument) -> None:
+    """Cost against accuracy of a scene. Not in this version."""
+    tell([not_in_this_version("accuracy")])
+    raise typer.Exit(INPUT)
+
+
+def default_folder(scene: Path) -> Path:
+    """``./<scene>-result``."""
+    return Path(f"{scene.stem}-result")
+
+
+def _refuse_later(resume: bool, group_size: int | None) -> None:
+    asked = (("--resume", resume), ("--group-size", group_size is not None))
+    faults = [not_in_this_version(name) for name, is_asked in asked if is_asked]
+    if faults:
+        tell(faults)
+        raise typer.Exit(INPUT)
+
+
+def _leave(command: str, request: RunRequest) -> NoReturn:
+    """Check the environment, run a command that solves, and leave with its exit code."""
+    from fenics_hytf.cli.environment import environment_faults
+
+    faults = environment_faults()
+    if faults:
+        tell(faults)
+        raise typer.Exit(INPUT)
+    from fenics_hytf.cli import check, run
+
+    commands: dict[str, Any] = {"run": run.run_scene, "check": check.check_scene}
+    raise typer.Exit(run.guarded(commands[command], request))

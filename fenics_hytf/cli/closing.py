@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: MIT
+"""The few lines that end a run on standard output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fenics_hytf.motion import GRAVITY
+
+_MOST = 12  # receivers listed
+
+
+def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
+    """What a run was and what came out.
+
+    Args:
+        summary: ``summary.json``.
+        folder: Where the result is.
+        plots: Whether there is a report.
+
+    Returns:
+        Lines of text.
+    """
+    lapses = summary["lapses"]
+    iterations = [lapse["iterations"] for lapse in lapses]
+    residuals = [lapse["worst_residual"] or 0.0 for lapse in lapses]
+    lines = (
+        f"{sum(lapse['solved_lines'] for lapse in lapses)} solved of "
+        f"{summary['work']['excited_lines']} excited, {summary['work']['factorisations']} "
+        f"factorisations, worst residual {max(residuals, default=0.0):.1e}"
+    )
+    rows = [("effects", ", ".join(summary["effects"]) or "none"), ("lines", lines)]
+    if any(iterations):
+        change = lapses[-1]["final_change"]
+        last = "" if change is None else f", last change {change:.1e}"
+        rows.append(("iterations", f"{sum(iterations)}{last}"))
+    rows += _peaks(summary)
+    rows += [("warning", text) for text in summary["warnings"]]
+    rows.append(("results", f"{folder / 'report.html' if plots else folder}"))
+    return "\n".join([summary["title"], *(f"  {name:11s} {text}" for name, text in rows)])
+
+
+def _peaks(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Peaks of the components that are driven, one row a receiver."""
+    rows: list[tuple[str, str]] = []
+    driven = [c for c in summary["components"] if c in summary["directions"]]
+    for name, peaks in list(summary["peaks"].items())[:_MOST]:
+        text = "; ".join(
+            f"{c}: total acceleration {peaks[f'A_{c}'] / GRAVITY:.3g} g, "
+            f"displacement {1e3 * peaks[f'u_{c}']:.3g} mm"
+            for c in driven
+        )
+        rows.append(("peaks" if not rows else "", f"{name}  {text}"))
+    left_out = len(summary["peaks"]) - len(rows)
+    if left_out:
+        rows.append(("", f"and {left_out} more receivers"))
+    return rows

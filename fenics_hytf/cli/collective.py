@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: MIT
+"""Steps that may fail on one rank only: all ranks agree, then all go on or all stop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from mpi4py import MPI
+
+from fenics_hytf.cli.outcome import InputError, WriteError
+from fenics_hytf.results import ResultError
+from fenics_hytf.scene import Scene, SceneError
+
+T = TypeVar("T")
+
+
+def agree(comm: MPI.Comm, action: Callable[[], T]) -> T:
+    """Do something on every rank; if one cannot, none goes on (collective).
+
+    Args:
+        comm: Communicator.
+        action: What to do; not collective itself.
+
+    Returns:
+        What the action returned on this rank.
+
+    Raises:
+        InputError: If the input was refused on any rank.
+        WriteError: If a file could not be written on any rank.
+    """
+    value: T | None = None
+    faults: list[str] = []
+    trouble = ""
+    try:
+        value = action()
+    except SceneError as error:
+        faults = [str(fault) for fault in error.faults]
+    except InputError as error:
+        faults = error.faults
+    except ResultError as error:
+        faults = [str(error)]
+    except OSError as error:
+        trouble = f"{error.strerror}: {error.filename}" if error.filename else str(error)
+    ranks = comm.allgather((faults, trouble))
+    for refused, _ in ranks:
+        if refused:
+            raise InputError(refused)
+    for _, stopped in ranks:
+        if stopped:
+            raise WriteError(stopped)
+    return value  # type: ignore[return-value]  # it is the action's
+
+
+def at_root(comm: MPI.Comm, action: Callable[[], T]) -> T | None:
+    """Do something on rank 0; if it cannot, no rank goes on (collective).
+
+    Returns:
+        What the action returned on rank 0, ``None`` on the others.
+
+    Raises:
+        InputError: If the input was refused.
+        WriteError: If a file could not be written.
+    """
+    return agree(comm, lambda: action() if comm.rank == 0 else None)
+
+
+def load_scene(
+    path: Path, overrides: Sequence[str], motion: Path | None, comm: MPI.Comm
+) -> tuple[Scene | None, list[str]]:
+    """Read a scene on every rank (collective).
+
+    Args:
+        path: The scene file.
+        overrides: ``key=value``.
+        motion: Record in the place of the first motion's, or ``None``.
+        comm: Communicator.
+
+    Returns:
+        The scene, ``None`` on every rank if any refused it; and the faults.
+    """
+    try:
+        return agree(comm, lambda: Scene.load(path, overrides, motion)), []
+    except InputError as error:
+        return None, error.faults

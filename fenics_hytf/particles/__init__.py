@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: MIT
+"""Material points: the store, search and inverse mapping, the transfer matrix S, movement.
+
+The soil's mass is carried by points that weigh on the nodes through M = S^T M_p S (4). Between
+lapses they move through the mesh, which stays, and are found again by Newton's method (7)-(9).
+"""
+
+from fenics_hytf.particles.kinematics import (
+    to_components,
+    to_tensor,
+    update_kinematics,
+    update_stress,
+    update_volume,
+)
+from fenics_hytf.particles.ledger import MassLedger
+from fenics_hytf.particles.mapping import inverse_map
+from fenics_hytf.particles.move import MoveReport, PointsNotFinite, PointsOutside, move
+from fenics_hytf.particles.points import Points, default_points_per_cell, quadrature_rule, seed
+from fenics_hytf.particles.search import locate, resolve_owners
+from fenics_hytf.particles.sites import Located, Sites, cell_centres
+from fenics_hytf.particles.transfer import (
+    gradient_matrices,
+    particle_mass_matrix,
+    transfer_matrix,
+)
+
+__all__ = [
+    "Located",
+    "MassLedger",
+    "MoveReport",
+    "Points",
+    "PointsNotFinite",
+    "PointsOutside",
+    "Sites",
+    "cell_centres",
+    "default_points_per_cell",
+    "gradient_matrices",
+    "inverse_map",
+    "locate",
+    "move",
+    "particle_mass_matrix",
+    "quadrature_rule",
+    "resolve_owners",
+    "seed",
+    "to_components",
+    "to_tensor",
+    "transfer_matrix",
+    "update_kinematics",
+    "update_stress",
+    "update_volume",
+]

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Volume, strain and static stress of the points through one lapse's increment of displacement.
+
+With the increment's gradient at a point, L = grad(du), constant over the lapse's step,
+
+    dF = exp(L),   volume <- volume exp(tr L),   strain <- strain + d,   d = sym L,
+    stress <- dF (stress + lambda tr(d) I + 2 G d) dF^T / det dF.
+
+A rotation (L skew) makes dF orthogonal: it changes neither a volume nor an invariant, where I + L
+and the midpoint rule would. The stress update's tangent is K_L + K_NL. Tensors of two-dimensional
+points are the in-plane ones; the third stretch is 1 and does not mix with them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import expm
+
+from fenics_hytf.particles.geometry import RealArray, chunks
+from fenics_hytf.particles.points import Points
+
+# Where the components xx, yy(, zz, yz, xz), xy stand in the tensor.
+_PLACES = {3: ((0, 1, 0), (0, 1, 1)), 6: ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1))}
+
+
+def to_tensor(components: RealArray) -> RealArray:
+    """Symmetric tensors from their components.
+
+    Args:
+        components: xx, yy, xy or xx, yy, zz, yz, xz, xy, shape ``(n, 3)`` or ``(n, 6)``.
+
+    Returns:
+        Tensors, shape ``(n, 2, 2)`` or ``(n, 3, 3)``.
+    """
+    row, column = _PLACES[components.shape[1]]
+    dim = max(row) + 1
+    tensor = np.empty((len(components), dim, dim))
+    tensor[:, row, column] = components
+    tensor[:, column, row] = components
+    return tensor
+
+
+def to_components(tensor: RealArray) -> RealArray:
+    """Components of symmetric tensors, the inverse of ``to_tensor``."""
+    row, column = _PLACES[3 * tensor.shape[1] - 3]
+    return tensor[:, row, column]
+
+
+def update_volume(volume: RealArray, gradient: RealArray) -> RealArray:
+    """Volumes after the increment.
+
+    Args:
+        volume: [m^3] or [m^2], shape ``(n,)``.
+        gradient: L[p, i, j] = d du_i / d x_j [-], shape ``(n, gdim, gdim)``.
+
+    Returns:
+        ``volume exp(tr L)``, shape ``(n,)``.
+    """
+    return volume * np.exp(np.trace(gradient, axis1=1, axis2=2))
+
+
+def update_stress(
+    stress: RealArray, gradient: RealArray, lame_lambda: RealArray, shear_modulus: RealArray
+) -> RealArray:
+    """Cauchy stress after the increment.
+
+    Args:
+        stress: Components [Pa], shape ``(n, 3)`` or ``(n, 6)``.
+        gradient: L [-], shape ``(n, gdim, gdim)``.
+        lame_lambda: Lame's first constant [Pa], shape ``(n,)``.
+        shear_modulus: G [Pa], shape ``(n,)``.
+
+    Returns:
+        Components [Pa], shaped like ``stress``.
+    """
+    updated = np.empty_like(stress)
+    for chunk in chunks(len(stress)):
+        L = gradient[chunk]
+        F = expm(L)
+        sigma = to_tensor(stress[chunk]) + shear_modulus[chunk, None, None] * (
+            L + L.transpose(0, 2, 1)
+        )
+        trace = np.trace(L, axis1=1, axis2=2)
+        sigma += (lame_lambda[chunk] * trace)[:, None, None] * np.eye(L.shape[1])
+        sigma = F @ sigma @ F.transpose(0, 2, 1) * np.exp(-trace)[:, None, None]
+        updated[chunk] = to_components(sigma)
+    return updated
+
+
+def update_kinematics(
+    points: Points,
+    gradient: RealArray,
+    lame_lambda: npt.ArrayLike | None = None,
+    shear_modulus: npt.ArrayLike | None = None,
+) -> None:
+    """Carry volume, and strain and stress where the points have them, through an increment.
+
+    Call it before ``move``, which changes the order of the points.
+
+    Args:
+        points: Points, changed in place.
+        gradient: L[p, i, j] = d du_i / d x_j at the points [-], shape ``(n, gdim, gdim)``.
+        lame_lambda: Lame's first constant [Pa], shape ``(n,)`` or one for all; for stress only.
+        shear_modulus: G [Pa], likewise.
+
+    Raises:
+        ValueError: If ``gradient`` has another shape, or points carry stress and a modulus is
+            missing.
+    """
+    n, gdim = points.x.shape
+    if gradient.shape != (n, gdim, gdim):
+        raise ValueError(
+            f"Found gradients of shape {gradient.shape}; expected {(n, gdim, gdim)}: one a point."
+        )
+    if "stress" in points.history:
+        if lame_lambda is None or shear_modulus is None:
+            raise ValueError("Found points with stress but no moduli; expected both, in Pa.")
+        moduli = (np.broadcast_to(np.asarray(m, float), n) for m in (lame_lambda, shear_modulus))
+        points["stress"] = update_stress(points["stress"], gradient, *moduli)
+    if "strain" in points.history:
+        symmetric = 0.5 * (gradient + gradient.transpose(0, 2, 1))
+        points["strain"] = points["strain"] + to_components(symmetric)
+    points.volume = update_volume(points.volume, gradient)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: MIT
+"""Results: the folder and its tables, ``summary.json``, ParaView files, figures, the report.
+
+A run writes through :class:`ResultFolder`; figures and the report are drawn from what stands in
+the folder alone, so that they can be drawn again later.
+"""
+
+from fenics_hytf.results.definition import describe_scene
+from fenics_hytf.results.folder import (
+    FINISHED,
+    PARTIAL,
+    ResultError,
+    ResultFolder,
+    folder_faults,
+    locked,
+    open_result,
+)
+from fenics_hytf.results.publish import publish
+from fenics_hytf.results.reader import StoredResult, read_result, read_table
+from fenics_hytf.results.summary import summarise
+
+__all__ = [
+    "FINISHED",
+    "PARTIAL",
+    "ResultError",
+    "ResultFolder",
+    "StoredResult",
+    "describe_scene",
+    "folder_faults",
+    "locked",
+    "open_result",
+    "publish",
+    "read_result",
+    "read_table",
+    "summarise",
+]

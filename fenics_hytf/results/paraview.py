@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: MIT
+"""Material points and nodal fields of a lapse as VTU files for ParaView.
+
+``points_NNNN.vtu`` and ``fields_NNNN.vtu``, NNNN the number of the lapse from 0. Places and vectors
+of plane problems get a third component, zero. A number that does not exist (no soil in a cell) is
+written as 0 and marked by a 0 in an array ``has_NAME``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import meshio
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from fenics_hytf.simulation import Snapshot
+
+Arrays = dict[str, npt.NDArray[Any]]
+
+
+def write_snapshot(folder: Path, snapshot: Snapshot) -> None:
+    """Write the points and, where there are any, the fields of a lapse.
+
+    Args:
+        folder: Where.
+        snapshot: Points and fields after the lapse.
+    """
+    if snapshot.points is not None:
+        data = dict(snapshot.points)
+        place = _three(data.pop("position"))
+        vertices = [("vertex", np.arange(len(place))[:, None])]
+        mesh = meshio.Mesh(place, vertices, point_data=_clean(data))
+        _write(folder / f"points_{snapshot.index:04d}.vtu", mesh)
+    if snapshot.vertices is not None and snapshot.cells is not None:
+        cells = [(snapshot.cell_type, snapshot.cells)]
+        mesh = meshio.Mesh(
+            _three(snapshot.vertices),
+            cells,
+            point_data=_clean(snapshot.vertex_fields),
+            cell_data={name: [v] for name, v in _clean(snapshot.cell_fields).items()},
+        )
+        _write(folder / f"fields_{snapshot.index:04d}.vtu", mesh)
+
+
+def _write(path: Path, mesh: meshio.Mesh) -> None:
+    """Write beside the place and rename: a reader sees a whole file or none."""
+    temporary = path.with_name(f".{path.name}")
+    try:
+        mesh.write(temporary, file_format="vtu")
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _three(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Vectors with a zero third component where they have two, shape ``(n, 3)``."""
+    padded = np.zeros((len(vectors), 3))
+    padded[:, : vectors.shape[1]] = vectors
+    return padded
+
+
+def _clean(data: Arrays | dict[str, npt.NDArray[np.float64]]) -> Arrays:
+    clean: Arrays = {}
+    for name, values in data.items():
+        array = np.asarray(values)
+        if np.issubdtype(array.dtype, np.floating):
+            exists = np.isfinite(array)
+            if not np.all(exists):
+                array = np.where(exists, array, 0.0)
+                flat = exists.reshape(len(array), -1)
+                clean[f"has_{name}"] = np.all(flat, axis=1).astype(np.uint8)
+        if array.ndim == 2 and array.shape[1] == 2:
+            array = _three(array)
+        elif array.dtype == bool:
+            array = array.astype(np.uint8)
+        clean[name] = array
+    return clean

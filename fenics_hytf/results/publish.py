@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""Figures and report from a result folder alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fenics_hytf.results.reader import read_result
+
+
+def publish(folder: Path, summary: dict[str, Any] | None = None) -> list[str]:
+    """Draw the figures of a result and write ``report.html``, all into its folder.
+
+    Args:
+        folder: Holds the tables, and ``summary.json`` unless the summary is given.
+        summary: The summary of a result that is about to be finished.
+
+    Returns:
+        Names of the files written.
+
+    Raises:
+        ResultError: If the folder holds no finished result, or one that cannot be read.
+    """
+    # matplotlib takes half a second to load; runs without figures do without
+    from fenics_hytf.results.figures import draw_figures
+    from fenics_hytf.results.report import write_report
+
+    stored = read_result(folder, summary)
+    drawings = draw_figures(stored)
+    write_report(stored, drawings)
+    return [drawing.file for drawing in drawings] + ["report.html"]

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: MIT
+"""Reading a result folder back: everything that figures and the report need, from CSV and JSON."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.results.folder import FINISHED, ResultError, check_finished
+from fenics_hytf.results.summary import FORMAT
+
+RealArray = npt.NDArray[np.float64]
+Table = Mapping[str, npt.NDArray[Any]]
+
+_BLOCK = 20_000  # rows converted at once
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """A result as it stands in a folder.
+
+    Columns of tables have the names of the CSV headers and the units said there.
+
+    Attributes:
+        folder: Where it stands.
+        summary: ``summary.json``.
+        receivers: ``receivers.csv``, columns of shape ``(num_samples,)``.
+        transfer: ``transfer.csv``, all lapses below each other.
+        spectra: ``spectra.csv``.
+        cells: ``cells.csv``, all lapses below each other; ``region`` holds names.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    receivers: Table
+    transfer: Table
+    spectra: Table
+    cells: Table
+
+    def transfer_function(self, column: str, lapse: int) -> tuple[RealArray, RealArray]:
+        """Amplitude of a transfer function on the solved lines of a lapse.
+
+        Args:
+            column: ``NAME.A_x`` or, with several motions, ``NAME.A_x/y``.
+            lapse: Number of the lapse.
+
+        Returns:
+            Frequency [Hz] and amplitude [-], both of shape ``(num_lines,)``.
+        """
+        here = self.transfer["lapse"] == lapse
+        real, imaginary = (self.transfer[f"{column}.{part}"][here] for part in ("re", "im"))
+        return self.transfer["frequency_hz"][here], np.hypot(real, imaginary)
+
+
+def read_result(folder: Path, summary: dict[str, Any] | None = None) -> StoredResult:
+    """Read a result folder.
+
+    Args:
+        folder: The folder.
+        summary: The summary if it is not written yet; else ``summary.json`` is read.
+
+    Returns:
+        The result.
+
+    Raises:
+        ResultError: If the folder holds no finished result, or files of it are missing or broken.
+    """
+    if summary is None:
+        check_finished(folder)
+    try:
+        if summary is None:
+            summary = _summary(folder)
+        tables = [
+            read_table(folder / f"{name}.csv")
+            for name in ("receivers", "transfer", "spectra", "cells")
+        ]
+    except (OSError, ValueError) as error:
+        raise ResultError(
+            f"{folder}: found a result that cannot be read ({error}); expected the files as a run "
+            "wrote them. Run the scene again"
+        ) from error
+    return StoredResult(folder, summary, *tables)
+
+
+def _summary(folder: Path) -> dict[str, Any]:
+    summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
+    if not isinstance(summary, dict) or summary.get("format") != FORMAT:
+        raise ValueError(f"{FINISHED} is not of this version")
+    return summary
+
+
+def read_table(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """Read a CSV table.
+
+    Args:
+        path: The file; its first row holds the names of the columns.
+
+    Returns:
+        Columns by name, shape ``(num_rows,)``: numbers where every field is a number or empty
+        (empty: NaN), else strings.
+
+    Raises:
+        ValueError: If a row has more or fewer fields than the header.
+    """
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.reader(file)
+        header = next(reader, [])
+        blocks: list[list[npt.NDArray[Any]]] = []
+        while rows := list(islice(reader, _BLOCK)):
+            if any(len(row) != len(header) for row in rows):
+                raise ValueError(f"{path.name} has rows that do not fit its header")
+            blocks.append([_column(values) for values in zip(*rows, strict=True)])
+    if not blocks:
+        return {name: np.empty(0) for name in header}
+    columns = zip(*blocks, strict=True)
+    return {name: np.concatenate(parts) for name, parts in zip(header, columns, strict=True)}
+
+
+def _column(values: tuple[str, ...]) -> npt.NDArray[Any]:
+    try:
+        return np.array([float(value) if value else np.nan for value in values])
+    except ValueError:
+        return np.array(values, dtype=object)

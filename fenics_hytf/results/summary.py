@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: MIT
+"""``summary.json``: what was run, what it took, what came out; all that figures need but arrays.
+
+A figure that does not exist (a residual of no solve, a change of no loop) is ``null``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from platform import python_version
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import fenics_hytf
+from fenics_hytf.motion import GRAVITY
+from fenics_hytf.results.definition import describe_scene
+from fenics_hytf.results.writers import QUANTITIES
+
+if TYPE_CHECKING:
+    from fenics_hytf.lapse import LapseResult
+    from fenics_hytf.simulation import Result
+
+FORMAT = 1
+"""Raised when a key of the summary changes its meaning."""
+
+PHASES = ("setup", "assembly", "sweep", "response", "convection", "output")
+
+_PACKAGES = {
+    "dolfinx": "fenics-dolfinx",
+    "petsc4py": "petsc4py",
+    "numpy": "numpy",
+    "scipy": "scipy",
+}
+
+
+def summarise(result: Result) -> dict[str, Any]:
+    """Everything of a simulation but its arrays, as JSON knows it.
+
+    Args:
+        result: The simulation.
+
+    Returns:
+        The summary; keys carry their units.
+    """
+    seconds = {phase: 0.0 for phase in PHASES} | result.work.wall_s
+    work = asdict(result.work) | {"wall_s": dict(seconds)}
+    summary = {
+        "format": FORMAT,
+        "title": result.scene.title,
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": versions(),
+        "ranks": result.num_ranks,
+        "scene_hash": result.scene.hash,
+        "scene": describe_scene(result.scene),
+        "effects": list(result.scene.effects.named),
+        "sizes": result.sizes,
+        "components": result.components,
+        "directions": result.directions,
+        "regions": result.region_names,
+        "dt_s": result.dt,
+        "samples": int(result.base_acceleration.shape[1]),
+        "duration_s": result.dt * result.base_acceleration.shape[1],
+        "motions": _motions(result),
+        "receivers": _receivers(result),
+        "lapses": [_lapse(lapse) for lapse in result.lapses],
+        "peaks": _peaks(result),
+        "work": work,
+        "wall_s": seconds,
+        "peak_memory_bytes": result.peak_memory,
+        "warnings": warnings(result),
+    }
+    return plain(summary)
+
+
+def warnings(result: Result) -> list[str]:
+    """What a reader has to know before using the figures."""
+    found = []
+    tolerance = result.scene.solver.tolerance
+    for lapse in result.lapses:
+        if lapse.worst_residual > tolerance:
+            found.append(
+                f"Lapse {lapse.index}: the worst relative residual is {lapse.worst_residual:.1e}, "
+                f"above the tolerance of {tolerance:.0e}."
+            )
+        lost = lapse.ledger.parked + lapse.ledger.deleted
+        if lost:
+            found.append(f"Lapse {lapse.index}: {lost} points had left the mesh by its end.")
+    if result.scene.effects.equivalent_linear is not None:
+        strains = [lapse.cells.effective_strain for lapse in result.lapses]
+        strain = max((float(np.nanmax(s, initial=0.0)) for s in strains), default=0.0)
+        if strain > 0.01:
+            found.append(
+                f"Effective strains reach {100 * strain:.2g} %. Above about 1 % an equivalent-"
+                "linear analysis is outside the range it was made for."
+            )
+    return found
+
+
+def component_peaks(summary: Mapping[str, Any]) -> dict[str, float]:
+    """Largest total acceleration of any receiver, by component [m/s^2].
+
+    Args:
+        summary: As :func:`summarise` makes it.
+
+    Returns:
+        The peaks; 0 where there are no receivers.
+    """
+    receivers = summary["peaks"].values()
+    return {
+        component: max((peaks[f"A_{component}"] or 0.0 for peaks in receivers), default=0.0)
+        for component in summary["components"]
+    }
+
+
+def versions() -> dict[str, str | None]:
+    """Versions of the programs that made a result; ``None`` where one is not installed."""
+    found = {"fenics_hytf": own_version()}
+    found |= {name: _version(package) for name, package in _PACKAGES.items()}
+    found["petsc"] = _petsc_version()
+    found["python"] = python_version()
+    return found
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON knows it: NumPy's numbers as Python's, NaN and infinity as ``None``."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def own_version() -> str | None:
+    """Version of this package; a checkout that is run in place is not installed."""
+    return getattr(fenics_hytf, "__version__", None) or _version("fenics-hytf")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _petsc_version() -> str | None:
+    try:
+        from petsc4py import PETSc
+    except ImportError:
+        return None
+    return ".".join(str(part) for part in PETSc.Sys.getVersion())
+
+
+def _motions(result: Result) -> list[dict[str, Any]]:
+    motions = []
+    for motion, direction, used in zip(
+        result.scene.motion, result.directions, result.base_acceleration, strict=True
+    ):
+        peak = float(np.max(np.abs(used)))
+        motions.append(
+            {
+                "direction": direction,
+                "name": motion.record.name,
+                "input": motion.input,
+                "pga_m_s2": peak,
+                "pga_g": peak / GRAVITY,
+                "dt_s": motion.record.dt,
+                "samples": int(motion.record.acceleration.size),
+            }
+        )
+    return motions
+
+
+def _receivers(result: Result) -> dict[str, Any]:
+    return {
+        name: {"place_m": place, "rides": result.scene.output.receivers[name].rides}
+        for name, place in zip(result.receivers, result.places, strict=True)
+    }
+
+
+def _lapse(lapse: LapseResult) -> dict[str, Any]:
+    change = lapse.loop.change
+    return {
+        "index": lapse.index,
+        "start_time_s": lapse.start_time,
+        "samples": lapse.num_samples,
+        "excited_lines": lapse.excited_lines,
+        "solved_lines": lapse.solved_lines,
+        "factorisations": lapse.factorisations,
+        "solves": lapse.solves,
+        "iterations": len(change),
+        "final_change": change[-1] if change else None,
+        "change": change,
+        "worst_cell": lapse.loop.worst_cell,
+        "worst_residual": lapse.worst_residual,
+        "points_lost": lapse.ledger.deleted,
+        "points_parked": lapse.ledger.parked,
+        "mass_ledger": lapse.ledger.as_dict(),
+    }
+
+
+def _peaks(result: Result) -> dict[str, dict[str, float]]:
+    """Largest absolute values by receiver, letter and component; units as in ``receivers.csv``."""
+    histories = {letter: result.history(name) for letter, name in QUANTITIES.items()}
+    return {
+        receiver: {
+            f"{letter}_{component}": float(np.max(np.abs(history[r, c]), initial=0.0))
+            for letter, history in histories.items()
+            for c, component in enumerate(result.components)
+        }
+        for r, receiver in enumerate(result.receivers)
+    }

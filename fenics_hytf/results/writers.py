@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT
+"""The tables of a result as CSV: histories, transfer functions, response spectra, cells.
+
+Numbers are written with the fewest digits that give back the same double. A number that does not
+exist (not finite) is an empty field. Rows are written in blocks; no file is ever a string.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.motion import response_spectrum
+
+if TYPE_CHECKING:
+    from fenics_hytf.lapse import LapseResult
+    from fenics_hytf.simulation import Result
+
+RealArray = npt.NDArray[np.float64]
+
+QUANTITIES = {
+    "u": "displacement",
+    "v": "velocity",
+    "a": "acceleration",
+    "A": "total_acceleration",
+}
+"""Letters in column names and what they stand for; ``A`` is total, the others are relative."""
+
+SPECTRUM_DAMPING = 0.05
+SPECTRUM_PERIODS = np.geomspace(0.01, 10.0, 181)  # 60 a decade
+
+_BLOCK = 2048  # rows formatted at once
+
+
+def write_tables(folder: Path, result: Result) -> None:
+    """Write ``receivers.csv``, ``transfer.csv``, ``spectra.csv`` and ``cells.csv``.
+
+    Args:
+        folder: Where.
+        result: The simulation.
+    """
+    _write_table(folder / "receivers.csv", *_receivers(result))
+    _write_table(folder / "transfer.csv", *_transfer(result))
+    _write_table(folder / "spectra.csv", *_spectra(result))
+    _write_table(folder / "cells.csv", *_cells(result))
+
+
+Rows = Iterator[list[Any]]
+
+
+def _write_table(path: Path, header: list[str], rows: Rows) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+
+
+def _rows(columns: Iterable[npt.ArrayLike]) -> Rows:
+    """Rows of columns of equal length; numbers that are not finite become ``None``."""
+    table = [np.asarray(column) for column in columns]
+    for start in range(0, len(table[0]), _BLOCK):
+        yield from zip(*(_plain(column[start : start + _BLOCK]) for column in table), strict=True)
+
+
+def _plain(column: npt.NDArray[Any]) -> list[Any]:
+    """A column as Python values, which print as the shortest text that reads back the same."""
+    values = list(column.tolist())
+    if np.issubdtype(column.dtype, np.floating) and not np.all(np.isfinite(column)):
+        return [v if np.isfinite(v) else None for v in values]
+    return values
+
+
+def _receivers(result: Result) -> tuple[list[str], Rows]:
+    """Time and the histories of every receiver."""
+    header = ["time_s"]
+    columns: list[RealArray] = []
+    histories = {letter: result.history(name) for letter, name in QUANTITIES.items()}
+    for r, receiver in enumerate(result.receivers):
+        for letter, history in histories.items():
+            for c, component in enumerate(result.components):
+                header.append(f"{receiver}.{letter}_{component}")
+                columns.append(history[r, c])
+    time = result.time[: sum(lapse.num_samples for lapse in result.lapses)]
+    return header, _rows([time, *columns])
+
+
+def _transfer(result: Result) -> tuple[list[str], Rows]:
+    """Total acceleration over the input as given on the solved lines, one block a lapse."""
+    header = ["frequency_hz", "lapse"]
+    several = len(result.directions) > 1
+    for receiver in result.receivers:
+        for component in result.components:
+            for direction in result.directions:
+                name = f"{receiver}.A_{component}" + (f"/{direction}" if several else "")
+                header += [f"{name}.re", f"{name}.im"]
+
+    def block(lapse: LapseResult) -> Rows:
+        values = lapse.transfer.reshape(-1, lapse.frequency.size)
+        parts = np.stack([values.real, values.imag], axis=1).reshape(-1, lapse.frequency.size)
+        return _rows([lapse.frequency, np.full(lapse.frequency.size, lapse.index), *parts])
+
+    return header, (row for lapse in result.lapses for row in block(lapse))
+
+
+def _spectra(result: Result) -> tuple[list[str], Rows]:
+    """5 % damped pseudo-acceleration of the receivers and of the input [m/s^2]."""
+    header = ["period_s"]
+    columns: list[RealArray] = []
+    history = result.history("total_acceleration")
+    for r, receiver in enumerate(result.receivers):
+        for c, component in enumerate(result.components):
+            header.append(f"{receiver}.PSA_{component}")
+            columns.append(_spectrum(history[r, c], result.dt))
+    for m, direction in enumerate(result.directions):
+        header.append(f"input.{direction}")
+        columns.append(_spectrum(result.base_acceleration[m], result.dt))
+    return header, _rows([SPECTRUM_PERIODS, *columns])
+
+
+def _spectrum(acceleration: RealArray, dt: float) -> RealArray:
+    if not np.any(acceleration):
+        return np.zeros_like(SPECTRUM_PERIODS)
+    return response_spectrum(acceleration, dt, SPECTRUM_PERIODS, SPECTRUM_DAMPING)
+
+
+def _cells(result: Result) -> tuple[list[str], Rows]:
+    """Values of the cells, one block a lapse."""
+    places = ["x", "y", "z"][: len(result.components)]
+    values = ["shear_modulus", "g_over_gmax", "damping", "effective_strain", "peak_stress"]
+    values.append("peak_acceleration")
+    names = np.array(result.region_names, dtype=object)
+
+    def block(lapse: LapseResult) -> Rows:
+        cells = lapse.cells
+        count = cells.region.size
+        return _rows(
+            [
+                np.full(count, lapse.index),
+                np.arange(count),
+                names[cells.region],
+                *cells.centroid.T,
+                *(getattr(cells, value) for value in values),
+            ]
+        )
+
+    rows = (row for lapse in result.lapses for row in block(lapse))
+    return ["lapse", "cell", "region", *places, *values], rows

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: MIT
+"""Made-up results of the right shapes, for tests of what is written and drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
+from fenics_hytf.particles import MassLedger
+from fenics_hytf.scene import Scene
+from fenics_hytf.simulation.records import Result, Snapshot, Work
+
+COMPONENTS = ("x", "y", "z")
+
+
+def make_scene(
+    directions=("x",), lapses=1, loop=True, gdim=2, kind="column", receivers=3, samples=240, **extra
+):
+    """A valid scene."""
+    sand = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "damping": 0.02}
+    fill = {**sand, "shear_wave_velocity": 150.0}
+    if loop:
+        curves = {"strain": [1e-6, 1e-4, 1e-2], "modulus": [1.0, 0.8, 0.1]}
+        sand["curves"] = fill["curves"] = {**curves, "damping": [0.01, 0.05, 0.2]}
+    if kind == "column":
+        layers = [
+            {"thickness": 4.0, "soil": "fill", "cells": 4},
+            {"thickness": 20.0, "soil": "sand", "cells": 10},
+        ]
+        mesh = {"column": {"width": 1.0, "layers": layers}}
+    else:
+        size = [40.0, 24.0] if gdim == 2 else [40.0, 30.0, 24.0]
+        cells = [20, 12] if gdim == 2 else [8, 6, 12]
+        regions = [{"soil": "sand", "below": 20.0}, {"soil": "fill"}]
+        mesh = {"box": {"size": size, "cells": cells}, "regions": regions}
+    places = {
+        f"r{i}": [0.5] * (gdim - 1) + [24.0 - 24.0 * i / max(receivers, 2)]
+        for i in range(receivers)
+    }
+    synthetic = {"n": samples, "dt": 0.05}
+    data = {
+        "title": "A made-up scene",
+        "mesh": mesh,
+        "soil": {"sand": sand, "fill": fill},
+        "motion": [{"direction": d, "synthetic": synthetic, "pga": 0.2} for d in directions],
+        "lapses": {"count": lapses},
+        "output": {"receivers": places},
+        **({"effects": {"equivalent_linear": True}} if loop else {}),
+        **extra,
+    }
+    return Scene.from_dict(data)
+
+
+def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", **more):
+    """A result with smooth histories, three excited lines' worth of resonance, plausible cells."""
+    scene = make_scene(directions, lapses, loop, gdim, kind, **more)
+    receivers = tuple(scene.output.receivers)
+    places = np.array([scene.output.receivers[r].place for r in receivers]).reshape(-1, gdim)
+    dt, samples = scene.dt, scene.motion[0].record.num_samples
+    base = np.array([m.record.acceleration for m in scene.motion])
+    return Result(
+        scene=scene,
+        num_ranks=1,
+        components=COMPONENTS[:gdim],
+        directions=tuple(directions),
+        receivers=receivers,
+        places=places,
+        region_names=("sand", "fill"),
+        dt=dt,
+        base_acceleration=base,
+        lapses=tuple(
+            _lapse(i, samples // lapses, dt, base, directions, places, loop, gdim, kind)
+            for i in range(lapses)
+        ),
+        sizes={"cells": _centroids(gdim, kind).shape[0], "unknowns": 60, "points": 56},
+        work=Work(
+            factorisations=240,
+            solves=240,
+            excited_lines=60 * lapses,
+            inverse_mappings=0,
+            assemblies={"elasticity": 8, "mass": 1},
+            wall_s={"setup": 0.5, "assembly": 0.2, "sweep": 2.5, "response": 0.4},
+        ),
+        peak_memory=300 * 2**20,
+    )
+
+
+def make_snapshot(index=0, fields=True, gdim=2):
+    """Four points in one cell, and the cell."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)[:, :gdim]
+    points = {
+        "position": 0.25 + 0.5 * corners,
+        "displacement": 1e-3 * corners,
+        "mass": np.full(4, 450.0),
+        "id": np.arange(4),
+    }
+    if not fields:
+        return Snapshot(index, 1.0, points)
+    return Snapshot(
+        index,
+        1.0,
+        points,
+        vertices=corners,
+        cells=np.array([[0, 1, 2, 3]]),
+        cell_type="quad",
+        vertex_fields={"displacement": 1e-3 * corners},
+        cell_fields={"shear_modulus": np.array([9e7]), "damping": np.array([np.nan])},
+    )
+
+
+def _lapse(index, samples, dt, base, directions, places, loop, gdim, kind):
+    time = dt * np.arange(index * samples, (index + 1) * samples)
+    shape = (len(places), gdim, samples)
+    u, total = np.zeros(shape), np.zeros(shape)
+    acceleration = np.zeros(shape)
+    frequency = np.arange(1, 61) / (samples * dt) * 2.0
+    transfer = np.zeros((len(places), gdim, len(directions), frequency.size), complex)
+    for m, direction in enumerate(directions):
+        c = COMPONENTS.index(direction)
+        for r, place in enumerate(places):
+            amplification = 1.0 + 1.5 * place[-1] / 24.0
+            record = base[m, index * samples : (index + 1) * samples]
+            total[r, c] = amplification * record
+            acceleration[r, c] = total[r, c] - record
+            u[r, c] = 0.01 * (amplification - 1.0) * np.sin(2 * np.pi * 0.7 * time)
+            ratio = frequency / 2.3
+            transfer[r, c, m] = 1 + (amplification - 1) / (1 - ratio**2 + 0.2j * ratio)
+    centroid = _centroids(gdim, kind)
+    depth = 24.0 - centroid[:, -1]
+    strain = 1e-4 * (1 + depth / 6.0) * (1.0 + 0.1 * index)
+    ratio = 1.0 / (1.0 + strain / 1e-3) if loop else np.ones_like(strain)
+    region = (centroid[:, -1] > 20.0).astype(np.int32)
+    gmax = np.where(region == 1, 4e7, 9e7)
+    return LapseResult(
+        index=index,
+        start_time=index * samples * dt,
+        num_samples=samples,
+        dt=dt,
+        excited_lines=60,
+        solved_lines=60,
+        factorisations=240,
+        solves=240,
+        worst_residual=3e-13,
+        loop=LoopHistory((0.5, 0.08, 0.011, 7e-4), (3, 3, 7, 7)) if loop else LoopHistory(),
+        frequency=frequency,
+        transfer=transfer,
+        displacement=u,
+        velocity=0.5 * u,
+        acceleration=acceleration,
+        total_acceleration=total,
+        cells=CellState(
+            region=region,
+            centroid=centroid,
+            shear_modulus=gmax * ratio,
+            g_over_gmax=ratio,
+            damping=0.01 + 0.1 * (1 - ratio) if loop else np.full_like(ratio, 0.02),
+            effective_strain=(0.65 if loop else 1.0) * strain,
+            peak_strain=strain,
+            peak_stress=gmax * ratio * strain,
+            peak_acceleration=2.0 + 3.0 * np.exp(-depth / 8.0),
+        ),
+        ledger=MassLedger(56, 44_040.0, 0, 0.0, 0, 0.0, 0, 44_040.0, 0.0),
+    )
+
+
+def _centroids(gdim, kind):
+    if kind == "column":
+        y = np.concatenate([1.0 + 2.0 * np.arange(10), 20.5 + np.arange(4)])
+        return np.column_stack([np.full(y.size, 0.5), y])
+    grids = ([20, 12], [40.0, 24.0]) if gdim == 2 else ([8, 6, 12], [40.0, 30.0, 24.0])
+    centres = [(np.arange(n) + 0.5) * size / n for n, size in zip(*grids, strict=True)]
+    return np.column_stack([a.ravel() for a in np.meshgrid(*centres, indexing="ij")])
