@@ -1,6 +1,7 @@
 """Figures that the tests measure, printed as one table at the end of the run."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from _pytest.terminal import TerminalReporter
@@ -17,6 +18,15 @@ def figure() -> Callable[[str, float, float, str], None]:
         assert measured <= limit, f"{name}: measured {measured:.4g}, at most {limit:.4g} {unit}"
 
     return require
+
+
+@pytest.fixture
+def shared_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that is the same on every rank; write on rank 0 only, then meet at a barrier."""
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    return Path(comm.bcast(tmp_path_factory.mktemp("shared") if comm.rank == 0 else None))
 
 
 def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:

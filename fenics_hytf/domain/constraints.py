@@ -96,12 +96,13 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
             )
         (low_number, low_place), (high_number, high_place) = sides
         across = [a for a in range(gdim) if a != axis]
-        _, partner, far = _match(low_place[:, across], high_place[:, across])
-        if len(low_number) != len(high_number) or len(far):
-            place = high_place[far[0]].tolist() if len(far) else "none in particular"
+        partner, lone_high = _match(low_place[:, across], high_place[:, across])
+        _, lone_low = _match(high_place[:, across], low_place[:, across])
+        lone = [*high_place[lone_high].tolist(), *low_place[lone_low].tolist()]
+        if lone:
             found = (
-                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(far)} "
-                f"of them without a partner (the first at {place})"
+                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(lone)} "
+                f"of them without a partner (the first at {lone[0]})"
             )
             expected = "the same nodes on both tied sides: mesh them alike"
             raise SceneError([Fault(f"boundary.{high}", found, expected)])
@@ -115,13 +116,13 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
 
 def _match(
     low: npt.NDArray[np.float64], high: npt.NDArray[np.float64]
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Nearest node of the low side for each of the high side, and those that have none."""
     if not len(low) or not len(high):
-        return np.empty(0), np.empty(0, np.int64), np.arange(len(high))
+        return np.empty(0, np.int64), np.arange(len(high))
     distance, partner = KDTree(low).query(high)
     tolerance = 1e-8 * max(float(np.ptp(low, axis=0).max()), np.finfo(float).tiny)
-    return distance, partner, np.flatnonzero(distance > tolerance)
+    return partner, np.flatnonzero(distance > tolerance)
 
 
 def _share_holds(domain: Domain, held: npt.NDArray[np.bool_], image: dict[int, int]) -> None:
