@@ -98,11 +98,11 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
         across = [a for a in range(gdim) if a != axis]
         partner, lone_high = _match(low_place[:, across], high_place[:, across])
         _, lone_low = _match(high_place[:, across], low_place[:, across])
-        lone = [*high_place[lone_high].tolist(), *low_place[lone_low].tolist()]
-        if lone:
+        lone = np.concatenate([high_place[lone_high], low_place[lone_low]])
+        if len(lone):
             found = (
-                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(lone)} "
-                f"of them without a partner (the first at {lone[0]})"
+                f"{len(high_number)} nodes against {len(low_number)} on '{low}', {len(lone)} of "
+                f"them without a partner (the first at {(lone[0].round(6) + 0.0).tolist()} m)"
             )
             expected = "the same nodes on both tied sides: mesh them alike"
             raise SceneError([Fault(f"boundary.{high}", found, expected)])

@@ -21,6 +21,8 @@ from fenics_hytf.frequency.system import DynamicSystem
 _PREFIX = "hytf_direct_"
 
 
+_FEW = 200  # unknowns; a cell has 81 at most
+
 # PETSc's own LDLᵀ has no start-up cost: on a column of 192 unknowns it took a quarter of MUMPS'
 # time, on a section of 420 two thirds, of 1640 1.2 times as much. It is serial.
 _SMALL = 1000
@@ -112,7 +114,9 @@ class SymmetricFactorisation:
         pc = self._solver.getPC()
         pc.setFactorSetUpSolverType()
         factor = pc.getFactorMatrix()
-        factor.setMumpsIcntl(7, 4)  # PORD: the default ordering is worse than LU's in 3D
+        # PORD, for the default ordering is worse than LU's in 3D; AMD for few unknowns: where all
+        # of them hang together, as in one or two cells, PORD ends the process.
+        factor.setMumpsIcntl(7, 4 if self.A.getSize()[0] > _FEW else 0)
         factor.setMumpsIcntl(12, 1)  # no compressed ordering of symmetric indefinite matrices
         factor.setMumpsIcntl(6, 0)  # no column permutation
         factor.setMumpsCntl(1, pivot)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 ScalarFunction = Callable[[complex], complex]
@@ -60,15 +61,15 @@ class DynamicSystem:
         self._require_one_pattern()
 
     def _require_one_pattern(self) -> None:
-        first = self.terms[0][0]
-        used = first.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"]
         # PETSc adds matrices declared of one pattern without looking: unequal ones corrupt the sum.
+        first = self.terms[0][0]
+        pattern = first.getValuesCSR()[:2]
         same = all(
             matrix.getSizes() == first.getSizes()
-            and matrix.getInfo(PETSc.Mat.InfoType.LOCAL)["nz_used"] == used
-            for matrix, _ in self.terms
+            and all(map(np.array_equal, matrix.getValuesCSR()[:2], pattern))
+            for matrix, _ in self.terms[1:]
         )
-        if not first.comm.tompi4py().allreduce(int(same)) == first.comm.size:
+        if not self.comm.tompi4py().allreduce(same, MPI.LAND):
             raise ValueError(
                 "K, M, C: found matrices of different sizes or sparsity patterns; expected one "
                 "pattern: assemble M and C into zeroed copies of K"

@@ -68,7 +68,9 @@ def test_three_cells_share_the_modulus(figure):
     # Three cells a sublayer, its modulus from the strain of the middle one: what is left of the
     # error is the mesh's, and that of strain falls with the square of the cell, nine times. Roughly
     # ten times is asked for; an independent finite-element code got 8.6 to 10 times here.
-    name = "c_darendeli24_synthetic_pga0p5"
+    # A recorded motion, whose mean is nought: the reference leaves out strain at zero frequency,
+    # which shifts its peaks by 2e-4 under the synthetic record's mean.
+    name = "c_darendeli24_NIS090_pga0p2"
     middle = 3 * (np.arange(72) // 3) + 1
     coarse, fine = errors(name, 1, tolerance=1e-6), errors(name, 3, middle, tolerance=1e-6)
     for quantity in ("surface acceleration rms", "strain", "G"):
