@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Systems and the direct sweep against dense algebra, on one rank and several."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
-from support.meshes import MOTION, scene
+from support.meshes import scene
 
 from fenics_hytf.domain import build
 from fenics_hytf.frequency import (
@@ -21,6 +23,7 @@ from fenics_hytf.frequency import (
 )
 from fenics_hytf.lapse import ElasticConstants, Equations
 from fenics_hytf.particles import default_points_per_cell, seed
+from fenics_hytf.scene import Scene
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 CONTOUR = [0.0, 5j, 31.4j, -31.4j, 0.7, 0.7 + 12j, 0.3 - 80j]  # [rad/s]
@@ -166,8 +169,10 @@ def test_the_matrix_is_symmetric_not_hermitian():
     A = system.create_matrix()
     for s in CONTOUR[1:]:
         system.fill(A, s)
-        assert A.isTranspose(A, 0.0)
-        assert not A.isHermitian(1e-6) or np.isreal(s)
+        # Sums are fused or not, depending on where an entry stands: one rounding.
+        assert A.isTranspose(A, 1e-15 * A.norm(PETSc.NormType.INFINITY))
+        # Symmetric and not real: not Hermitian.
+        assert np.any(A.getValuesCSR()[2].imag) or not np.imag(s)
 
 
 def pattern_of(parts, name, keep) -> sparse.csr_matrix:
@@ -245,7 +250,7 @@ def test_counts_and_residuals_are_true(package):
         assert np.all(relative < 1e-13)
         assert np.all(sweep.residuals[k] < 1e-13)
         # Both are round-off, summed in another order.
-        np.testing.assert_allclose(sweep.residuals[k], relative, atol=1e-15)
+        np.testing.assert_allclose(sweep.residuals[k], relative, rtol=0.5, atol=1e-15)
 
 
 def test_projections_and_sums_of_the_solutions():
@@ -342,23 +347,24 @@ def test_a_resonance_hit_exactly_is_refused(package):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("size", [6, 600])
-def test_a_resonance_of_a_chain(size):
-    # Springs 1, masses 1, one end held, the other on a roller: ω² = 2 - 2 cos(θ). With n = 3 k
-    # masses held at both ends, θ = 2π/3 gives ω² = 3, whose mode is (1, -1, 0) repeated: exact.
-    n = size - 1
-    K = sparse.diags_array([-np.ones(n - 1), 2 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
-    M = sparse.csr_matrix(K)
-    M.data = np.where(M.data == 2, 1.0, 0.0)
+@pytest.mark.parametrize(
+    ("size", "omega"),
+    [(5, 1.0), (599, 1.0), (599, np.sqrt(3.0)), (1199, 1.0), (1199, np.sqrt(3.0))],
+)
+def test_a_resonance_of_a_chain(size, omega):
+    # Unit springs and masses between two walls: ω² = 2 - 2 cos(π k/(size + 1)), 1 and 3 at a third
+    # and two thirds. At ω = 1 the matrix is singular exactly; √3² misses 3 by one rounding.
+    bands = [-np.ones(size - 1), 2 * np.ones(size), -np.ones(size - 1)]
+    K = sparse.csr_matrix(sparse.diags_array(bands, offsets=[-1, 0, 1]))
+    M = K.copy()
+    M.data = np.where(K.data == 2, 1.0, 0.0)
     system = DynamicSystem(matrix(K, WORLD), matrix(M, WORLD))
-    omega = np.sqrt(3.0)
-    b = vector(np.arange(n) == 0, WORLD)
-    # √3² is 3 but for one rounding: the matrix is singular to 1e-16, its inverse full of noise.
+    b = vector(np.arange(size) == 0, WORLD)
     with pytest.raises(SweepError) as caught:
-        direct_sweep(system, b, [1j, 1j * omega], tolerance=1e-9)
+        direct_sweep(system, b, [0.5j, 1j * omega], tolerance=1e-9)
     assert caught.value.s == 1j * omega
-    damped_contour = direct_sweep(system, b, [0.05 + 1j * omega], tolerance=1e-9)
-    assert damped_contour.residuals.max() < 1e-9
+    contour = direct_sweep(system, b, [0.05 + 1j * omega], tolerance=1e-9)
+    assert contour.residuals.max() < 1e-9
 
 
 def test_a_body_without_support_is_refused_at_rest(package):
@@ -423,18 +429,17 @@ def test_unknowns_that_all_hang_together(n, monkeypatch):
 # ---------------------------------------------------------------- stiffness contrast
 
 
-def section(contrast: float, damping: float, comm: MPI.Comm, cell="quadrilateral") -> Equations:
-    """A section of 20 m x 10 m with a lens a given number of times softer than the rest."""
+def lens(cell: str) -> Scene:
+    """A section of 20 m x 10 m with a lens a million times softer than the ground round it."""
+    polygon = [[4, 5], [16, 5], [16, 8], [4, 8]]
     soft = {"density": 1500.0, "shear_wave_velocity": 30.0, "poisson": 0.45}
-    stiff = soft | {"shear_wave_velocity": 30.0 * np.sqrt(contrast)}
-    mesh = {
-        "box": {"size": [20.0, 10.0], "cells": [20, 10], "cell": cell},
-        "regions": [
-            {"soil": "soft", "polygon": [[4, 5], [16, 5], [16, 8], [4, 8]]},
-            {"soil": "stiff"},
-        ],
-    }
-    return scene(mesh, soil={"soft": soft, "stiff": stiff}, motion=[MOTION])
+    return scene(
+        {
+            "box": {"size": [20.0, 10.0], "cells": [20, 10], "cell": cell},
+            "regions": [{"soil": "soft", "polygon": polygon}, {"soil": "stiff"}],
+        },
+        soil={"soft": soft, "stiff": soft | {"shear_wave_velocity": 30e3}},
+    )
 
 
 @pytest.mark.mpi
@@ -442,30 +447,26 @@ def section(contrast: float, damping: float, comm: MPI.Comm, cell="quadrilateral
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_stiffness_contrast_of_a_million(cell, damping, package, figure):
     """Hard case 19: residual below 1e-9 up to 50 Hz, without damping and with."""
-    case = section(1e6, damping, WORLD, cell)
+    case = lens(cell)
     domain = build(case, WORLD)
-    from collections import Counter
-
     equations = Equations(case, domain, Counter())
-    density = [case.soil[name].density for name in domain.region_names]
+    soils = [case.soil[name] for name in domain.region_names]
+    density = [soil.density for soil in soils]
     equations.weigh(seed(domain.mesh, domain.regions, density, default_points_per_cell(cell, 1)))
     region = domain.gather_cells(domain.regions)
-    shear, lame = (
-        np.array([getattr(case.soil[n].elastic, constant) for n in domain.region_names])[region]
-        for constant in ("shear_modulus", "lame_lambda")
-    )
-    real = ElasticConstants(lame, shear)
+    shear = np.array([soil.elastic.shear_modulus for soil in soils])[region]
+    lame = np.array([soil.elastic.lame_lambda for soil in soils])[region]
     imaginary = ElasticConstants(2 * damping * lame, 2 * damping * shear) if damping else None
-    lapse = equations.assemble(real, imaginary)
+    lapse = equations.assemble(ElasticConstants(lame, shear), imaginary)
     lines = 2j * np.pi * np.array([0.0, 0.1, 0.7, 2.3, 9.1, 27.0, 50.0])
     sweep = direct_sweep(lapse.system, lapse.sides, lines, tolerance=1e-9)
-    A, x, b = lapse.system.create_matrix(), lapse.sides[0].duplicate(), lapse.sides[0]
+    (b,) = lapse.sides
+    A, x, left = lapse.system.create_matrix(), b.duplicate(), b.duplicate()
     worst = 0.0
     for k, s in enumerate(lines):
         lapse.system.fill(A, s)
-        assert A.isTranspose(A, 1e-15 * A.norm())
+        assert A.isTranspose(A, 1e-15 * A.norm(PETSc.NormType.INFINITY))
         x.array[:] = sweep.solution(k)[:, 0]
-        left = b.duplicate()
         A.mult(x, left)
         left.aypx(-1.0, b)
         worst = max(worst, left.norm() / b.norm())
