@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Hybrid time-frequency ground response with material points, on FEniCSx.
 
-    from fenics_hytf import Scene, simulate
-    result = simulate(Scene.load("scene.toml"))
+from fenics_hytf import Scene, simulate
+result = simulate(Scene.load("scene.toml"))
 """
 
 from __future__ import annotations

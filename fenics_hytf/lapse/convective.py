@@ -17,6 +17,8 @@ from fenics_hytf.lapse.ground import ElasticConstants
 from fenics_hytf.particles import (
     MoveReport,
     Points,
+    PointsNotFinite,
+    PointsOutside,
     gradient_matrices,
     move,
     to_tensor,
@@ -53,10 +55,11 @@ def convect(
         The mass ledger, and how many points were mapped.
 
     Raises:
-        PointsOutside: A point left the mesh and ``outside`` is ``error``; on every rank, the points
-            unmoved.
-        PointsNotFinite: The increment is not finite.
+        PointsOutside: A point left the mesh and ``outside`` is ``error``.
+        PointsNotFinite: The increment is not finite. Each is raised on every rank, and leaves the
+            points as they were.
     """
+    before = points.arrays() | {name: old.copy() for name, old in points.history.items()}
     S = transfer_matrix(points, domain.V)
     gradient = np.stack([dS @ increment for dS in gradient_matrices(points, domain.V)], axis=2)
     for name, field in (("velocity", velocity), ("acceleration", acceleration)):
@@ -72,7 +75,11 @@ def convect(
     displacement = S @ increment
     if np.isfinite(gradient).all():
         update_kinematics(points, gradient, **moduli)
-    return move(domain.mesh, points, displacement, outside)
+    try:
+        return move(domain.mesh, points, displacement, outside)
+    except (PointsOutside, PointsNotFinite):
+        points.assign(before)
+        raise
 
 
 def cell_stress(domain: Domain, points: Points) -> RealArray:

@@ -1,0 +1,602 @@
+# SPDX-License-Identifier: MIT
+"""Parts of a lapse: acceleration of the loop, strain measures, what is in a cell, the input."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+from support.meshes import SOIL, scene
+
+from fenics_hytf.domain import build, constraint_matrix
+from fenics_hytf.lapse import (
+    Anderson,
+    CellProbe,
+    EmptyCellError,
+    EquivalentLinearError,
+    Excitation,
+    Ground,
+    Moduli,
+    complex_constants,
+    excite,
+    first_strain,
+    iterate,
+    shear_strain,
+    survey,
+)
+from fenics_hytf.motion import to_time
+from fenics_hytf.particles import quadrature_rule, seed
+from fenics_hytf.particles.points import take
+from fenics_hytf.scene import EquivalentLinear
+from fenics_hytf.soil import Curve
+
+WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
+EPS = np.finfo(float).eps
+
+
+# ---------------------------------------------------------------- Anderson acceleration
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_a_linear_fixed_point_is_found_in_n_plus_one_steps(n):
+    rng = np.random.default_rng(n)
+    A = rng.normal(size=(n, n))
+    A *= 0.9 / np.linalg.norm(A, 2)
+    b = 0.1 * rng.normal(size=n)  # near: no step is cut
+    fixed = np.linalg.solve(np.eye(n) - A, b)
+    accelerated, x = Anderson(memory=n), np.zeros(n)
+    errors = []
+    for _ in range(n + 1):
+        x = accelerated.next(x, A @ x + b)
+        errors.append(np.abs(x - fixed).max())
+    assert errors[-1] < 1e-9  # least squares with condition numbers up to 1e5
+    assert errors[0] > 1e-3
+
+
+@pytest.mark.parametrize("slope", [-1.0, -0.99, -1.5])
+def test_oscillation_is_damped_at_once(slope):
+    # x = slope x: Picard alternates for ever, or worse.
+    accelerated, x = Anderson(), np.array([0.3])
+    for _ in range(2):
+        x = accelerated.next(x, slope * x)
+    assert abs(x[0]) < 1e-15
+
+
+def test_a_long_step_is_cut():
+    # x → 0.999 x: the secant step goes all the way, 100 in ln γ.
+    accelerated, x = Anderson(), np.array([100.0])
+    x = accelerated.next(x, 0.999 * x)
+    x, before = accelerated.next(x, 0.999 * x), x
+    assert before[0] - x[0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_points_that_repeat_do_no_harm():
+    accelerated, x = Anderson(), np.array([0.1, 0.2])
+    for _ in range(4):
+        x = accelerated.next(np.array([0.1, 0.2]), np.array([0.15, 0.2]))
+    assert np.isfinite(x).all()
+
+
+# ---------------------------------------------------------------- the equivalent-linear loop
+
+STRAIN = np.array([1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
+SOFTENING = np.array([1.0, 0.97, 0.75, 0.3, 0.06])
+RISING = np.array([0.01, 0.015, 0.05, 0.14, 0.24])
+GMAX = 50e6
+
+
+def ground(*curves, cells=(0,)) -> Ground:
+    """Cells of soils with given curves."""
+    region = np.array(cells, np.int32)
+    full = np.ones(len(region))
+    return Ground(region, GMAX * full, 0.3 * full, 0.02 * full, curves)
+
+
+def settings(**changes) -> EquivalentLinear:
+    return EquivalentLinear(**{"tolerance": 1e-4, "strain_ratio": 0.65, **changes})
+
+
+def run(soil, peak, start, strain_from=None, **changes):
+    """The loop's results, the moduli of each of its solves, and what it reported."""
+    solved, reported = [], []
+
+    def peak_strain(moduli, iteration):
+        solved.append(moduli)
+        assert iteration == len(solved)
+        return peak(moduli)
+
+    moduli, effective, history = iterate(
+        soil,
+        settings(**changes),
+        np.broadcast_to(start, soil.region.shape).astype(float),
+        peak_strain,
+        lambda iteration, change: reported.append((iteration, change)),
+        strain_from,
+    )
+    assert reported == [(i + 1, c) for i, c in enumerate(history.change)]
+    assert moduli is solved[-1]
+    return moduli, effective, history
+
+
+def consistent(soil, moduli, effective, tolerance=1e-4):
+    """The moduli are those of the strain that they caused."""
+    G, D = soil.secant(effective).shear_modulus, soil.secant(effective).damping
+    np.testing.assert_allclose(moduli.shear_modulus, G, rtol=tolerance)
+    np.testing.assert_allclose(moduli.damping, D, rtol=tolerance)
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("load", [1e-5, 5e-5, 1e-4])
+def test_the_loop_finds_the_fixed_point(load, power):
+    # Stress-controlled: peak = load (Gmax/G)^p. The slope of the map in ln γ is up to 0.6 here.
+    curve = Curve(STRAIN, SOFTENING, RISING)
+    soil = ground(curve)
+
+    def defect(x):
+        return np.log(0.65 * load * curve.evaluate(np.exp(x))[0] ** -power) - x
+
+    fixed = brentq(defect, np.log(1e-6), np.log(2e-4))
+    moduli, effective, history = run(
+        soil, lambda m: load * (GMAX / m.shear_modulus) ** power, 1e-5, tolerance=1e-6
+    )
+    consistent(soil, moduli, effective, 1e-6)
+    # A change of 1e-6 in G or D is one of some 1e-5 in strain at the flat end of the curves.
+    assert np.log(effective[0]) == pytest.approx(fixed, abs=2e-5)
+    assert history.change[-1] <= 1e-6 < history.change[-2]
+
+
+def test_damping_counts_where_the_modulus_is_flat():
+    curve = Curve(STRAIN, np.full(5, 0.8), RISING)
+    soil = ground(curve)
+    moduli, effective, history = run(soil, lambda m: 5e-5 / m.damping, 1e-2)
+    assert len(history.change) > 2
+    consistent(soil, moduli, effective)
+
+
+def test_a_flat_damping_branch_does_not_fake_convergence():
+    # D never changes; a test on D alone, or on the signed change, would stop at once.
+    curve = Curve(STRAIN, SOFTENING, np.full(5, 0.05))
+    soil = ground(curve)
+    for start in (1e-6, 1e-2):  # from either side: the change has either sign
+        moduli, effective, history = run(soil, lambda m: 2e-4 * GMAX / m.shear_modulus, start)
+        assert len(history.change) > 2
+        consistent(soil, moduli, effective)
+
+
+def test_a_linear_soil_takes_one_solve():
+    soil = ground(None, cells=(0, 0))
+    moduli, effective, history = run(soil, lambda m: np.array([1e-4, 2e-4]), 1e-5)
+    assert history.change == (0.0,)
+    np.testing.assert_allclose(effective, [0.65e-4, 1.3e-4], rtol=4 * EPS)
+    assert moduli.shear_modulus.tolist() == [GMAX, GMAX]
+
+
+def test_a_still_ground_is_no_error():
+    soil = ground(Curve(STRAIN, SOFTENING, RISING))
+    moduli, effective, _ = run(soil, lambda m: np.zeros(1), 0.0)
+    assert effective.tolist() == [0.0]
+    assert moduli.shear_modulus.tolist() == [GMAX]
+
+
+def test_a_two_cycle_ends_in_an_error_with_its_cell():
+    """Strain falls when the modulus falls, with a jump: no moduli fit, in cell 3 alone."""
+    soil = ground(Curve(STRAIN, SOFTENING, RISING), None, cells=(0, 1, 0, 0, 1))
+
+    def peak(moduli):
+        strain = 1e-4 * GMAX / moduli.shear_modulus
+        strain[3] = 1e-5 if moduli.shear_modulus[3] < 0.6 * GMAX else 1e-3
+        return strain
+
+    for limit in (1, 2, 7, 40):
+        with pytest.raises(EquivalentLinearError) as caught:
+            run(soil, peak, 1e-4, max_iterations=limit)
+        assert caught.value.worst_cell == (3 if limit > 1 else caught.value.worst_cell)
+        assert caught.value.change > 0.1
+        assert f"iteration {limit}: found cell" in str(caught.value)
+    assert "cell 3 still changing" in str(caught.value)
+
+
+def test_a_smooth_two_cycle_converges():
+    # The map's slope in ln γ is -1.2 at the fixed point: plain iteration would leave it.
+    curve = Curve(STRAIN, SOFTENING, RISING)
+    soil = ground(curve)
+
+    def image(x):
+        return np.log(3e-4 * (curve.evaluate(np.exp(x))[0] / 0.6) ** 4)
+
+    fixed = brentq(lambda x: image(x) - x, -12, -4)
+    assert (image(fixed + 1e-3) - image(fixed - 1e-3)) / 2e-3 < -1.1
+    moduli, effective, _ = run(
+        soil,
+        lambda m: 3e-4 / 0.65 * (m.shear_modulus / (0.6 * GMAX)) ** 4,
+        np.exp(fixed + 0.02),
+        tolerance=1e-6,
+    )
+    consistent(soil, moduli, effective, 1e-6)
+    assert np.log(effective[0]) == pytest.approx(fixed, abs=2e-5)
+
+
+def test_cells_can_share_the_strain_of_another():
+    soil = ground(Curve(STRAIN, SOFTENING, RISING), cells=(0, 0, 0))
+    centre = np.array([1, 1, 1])
+    moduli, effective, _ = run(
+        soil, lambda m: np.array([1e-6, 2e-4, 3e-3]) * GMAX / m.shear_modulus, 1e-4, centre
+    )
+    assert len(set(moduli.shear_modulus)) == 1
+    alone, strain, _ = run(ground(soil.curves[0]), lambda m: 2e-4 * GMAX / m.shear_modulus, 1e-4)
+    np.testing.assert_allclose(effective, strain[0], rtol=1e-12)
+    np.testing.assert_allclose(moduli.shear_modulus, alone.shear_modulus[0], rtol=1e-12)
+
+
+def test_first_guess():
+    # ratio × PGV/Vs
+    soil = ground(None, cells=(0, 0))
+    density = np.array([2000.0, 500.0])
+    speed = np.sqrt(GMAX / density)
+    np.testing.assert_allclose(first_strain(soil, density, 0.3, 0.65), 0.65 * 0.3 / speed)
+
+
+# ---------------------------------------------------------------- strain measures
+
+
+def voigt(tensor) -> np.ndarray:
+    """Components with γ = 2ε, as one site at one instant."""
+    pairs = [(0, 0), (1, 1)] if len(tensor) == 2 else [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2)]
+    pairs.append((0, 1))
+    return np.array([tensor[i, j] * (1 if i == j else 2) for i, j in pairs])[None, :, None]
+
+
+@pytest.mark.parametrize(
+    ("strain", "plane", "spatial"),
+    [
+        ([0.0, 0.0, 3e-4], 3e-4, 3e-4),  # pure shear
+        ([2e-4, 0.0, 0.0], 2e-4, 2e-4),  # uniaxial
+        ([-2e-4, 0.0, 0.0], 2e-4, 2e-4),
+        ([2e-4, 2e-4, 0.0], 0.0, 2e-4),  # equal: no shear in the plane, but across it
+        ([-2e-4, -2e-4, 0.0], 0.0, 2e-4),
+        ([1e-4, -1e-4, 0.0], 2e-4, 2e-4),  # pure shear, turned by 45°
+        ([3e-4, 1e-4, 0.0], 2e-4, 3e-4),
+        ([0.0, 0.0, 0.0], 0.0, 0.0),
+    ],
+)
+def test_strain_measures_in_plane_strain(strain, plane, spatial):
+    values = np.array(strain)[None, :, None]
+    assert shear_strain(values, "plane")[0, 0] == pytest.approx(plane, abs=1e-19)
+    assert shear_strain(values, "3d")[0, 0] == pytest.approx(spatial, abs=1e-19)
+
+
+def test_strain_measures_do_not_depend_on_the_axes():
+    rng = np.random.default_rng(6)
+    tensor = rng.normal(size=(3, 3))
+    tensor += tensor.T
+    principal = np.linalg.eigvalsh(tensor)
+    for turn in Rotation.random(20, rng=rng).as_matrix():
+        found = shear_strain(voigt(turn @ tensor @ turn.T))[0, 0]
+        assert found == pytest.approx(principal[2] - principal[0], rel=1e-13)
+    flat = tensor.copy()
+    flat[2], flat[:, 2] = 0.0, 0.0
+    third = np.linalg.eigvalsh(flat)
+    for angle in np.linspace(0, np.pi, 13):
+        c, s = np.cos(angle), np.sin(angle)
+        turned = np.array([[c, -s], [s, c]]) @ flat[:2, :2] @ np.array([[c, s], [-s, c]])
+        assert shear_strain(voigt(turned), "3d")[0, 0] == pytest.approx(
+            third[2] - third[0], rel=1e-13
+        )
+        # In three dimensions the same measure.
+        assert shear_strain(voigt(flat))[0, 0] == pytest.approx(third[2] - third[0], rel=1e-13)
+
+
+def test_spatial_strains_by_their_components():
+    for component in (3, 4, 5):  # engineering shear alone
+        values = np.zeros((1, 6, 2))
+        values[0, component] = [4e-4, -4e-4]
+        np.testing.assert_allclose(shear_strain(values), [[4e-4, 4e-4]], rtol=1e-14)
+    values = np.zeros((1, 6, 1))
+    values[0, :3, 0] = [1e-4, -2e-4, 5e-4]
+    np.testing.assert_allclose(shear_strain(values), [[7e-4]], rtol=1e-14)
+
+
+# ---------------------------------------------------------------- what is in a cell
+
+CURVED = {
+    "curves": {
+        "strain": STRAIN.tolist(),
+        "modulus": SOFTENING.tolist(),
+        "damping": RISING.tolist(),
+    }
+}
+SOILS = {
+    "clay": SOIL | {"damping": 0.03},
+    "sand": SOIL | {"shear_modulus": 40e6, "poisson": 0.2, "damping": 0.07},
+}
+del SOILS["sand"]["shear_wave_velocity"]
+
+
+def strip(comm, **sections):
+    """Six cells of clay under six of sand, nine points in each."""
+    regions = [{"soil": "clay", "below": 0.5}, {"soil": "sand"}]
+    mesh = {"box": {"size": [6.0, 1.0], "cells": [6, 2]}, "regions": regions}
+    case = scene(mesh, soil=SOILS, **sections)
+    domain = build(case, comm)
+    points = seed(domain.mesh, domain.regions, [1800.0, 1800.0], 9)
+    return case, domain, points
+
+
+@pytest.mark.mpi
+def test_a_cell_takes_the_mean_of_its_points_by_volume():
+    case, domain, points = strip(WORLD)
+    # The sand of the last column of Gauss points in each upper cell becomes clay: 5/18 of its area.
+    names = domain.region_names
+    X, w = quadrature_rule("quadrilateral", 9)
+    last = X[:, 0] > 0.8
+    assert w[last].sum() == pytest.approx(5 / 18)
+    points.region[points.X[:, 0] > 0.8] = names.index("clay")
+    ground = survey(case, domain, points)
+    assert ground.region.tolist() == [names.index("clay")] * 6 + [names.index("sand")] * 6
+    clay, sand = case.soil["clay"].elastic, case.soil["sand"].elastic
+    share = 5 / 18
+    for name, a, b in (
+        ("shear_modulus", clay.shear_modulus, sand.shear_modulus),
+        ("poisson", 0.3, 0.2),
+        ("damping", 0.03, 0.07),
+    ):
+        values = getattr(ground, name)
+        assert np.all(values[:6] == a)  # one soil: free of round-off
+        np.testing.assert_allclose(values[6:], share * a + (1 - share) * b, rtol=1e-14)
+    assert ground.curves == (None, None)
+
+
+def test_volume_counts_not_the_number_of_points():
+    case, domain, points = strip(SELF)
+    upper = domain.input_cells[points.cell] >= 6
+    points.region[upper & (points.X[:, 0] > 0.8)] = domain.region_names.index("clay")
+    points.volume[upper & (points.X[:, 0] > 0.8)] *= 10  # swollen
+    ground = survey(case, domain, points)
+    share = 50 / (50 + 13)
+    expected = share * 0.3 + (1 - share) * 0.2
+    np.testing.assert_allclose(ground.poisson[6:], expected, rtol=1e-14)
+    assert np.all(ground.region == domain.region_names.index("clay"))  # which fills most of it
+
+
+def test_curves_come_with_the_loop_only():
+    case, domain, points = strip(SELF)
+    soils = {name: soil | CURVED for name, soil in SOILS.items()}
+    plain = scene(case.data["mesh"], soil=soils)
+    loop = scene(case.data["mesh"], soil=soils, effects={"equivalent_linear": True})
+    linear, curved = (survey(s, domain, points) for s in (plain, loop))
+    assert linear.curves == (None, None)
+    assert not linear.nonlinear.any()
+    assert curved.nonlinear.all()
+    np.testing.assert_allclose(curved.damping, RISING[0])
+    assert set(linear.damping) == {0.03, 0.07}
+    secant = curved.secant(np.full(12, 1e-4))
+    np.testing.assert_allclose(secant.shear_modulus, 0.75 * curved.shear_modulus, rtol=1e-14)
+
+
+@pytest.mark.mpi
+def test_an_empty_cell_is_named_on_every_rank():
+    case, domain, points = strip(WORLD)
+    number = domain.input_cells[points.cell]
+    points.assign(take(points.arrays(), ~np.isin(number, [4, 9])))
+    with pytest.raises(
+        EmptyCellError, match="found 2 cells without material points, the first: 4, 9"
+    ):
+        survey(case, domain, points)
+
+
+# ---------------------------------------------------------------- complex constants
+
+FACTORS = {
+    "hysteretic": lambda D: 1 + 2j * D,
+    "kramer": lambda D: 1 - D**2 + 2j * D,
+    "shake91": lambda D: 1 - 2 * D**2 + 2j * D * np.sqrt(1 - D**2),
+    "dormieux": lambda D: np.sqrt(1 - 4 * D**2) + 2j * D,
+}
+MIXED = Ground(
+    np.zeros(3, np.int32),
+    np.array([50e6, 80e6, 20e6]),
+    np.array([0.0, 0.3, 0.49]),
+    np.zeros(3),
+    (None,),
+)
+SECANT = Moduli(np.array([30e6, 80e6, 5e6]), np.array([0.1, 0.0, 0.24]))
+
+
+@pytest.mark.parametrize("convention", FACTORS)
+def test_keeping_poissons_ratio(convention):
+    real, imaginary = complex_constants(MIXED, SECANT, convention, "poisson")
+    G = real.shear_modulus + 1j * imaginary.shear_modulus
+    lame = real.lame_lambda + 1j * imaginary.lame_lambda
+    np.testing.assert_allclose(G, SECANT.shear_modulus * FACTORS[convention](SECANT.damping))
+    np.testing.assert_allclose(lame / (2 * (lame + G)), MIXED.poisson, atol=4 * EPS)  # ν, real
+
+
+@pytest.mark.parametrize("convention", FACTORS)
+def test_keeping_the_bulk_modulus(convention):
+    real, imaginary = complex_constants(MIXED, SECANT, convention, "bulk")
+    G = real.shear_modulus + 1j * imaginary.shear_modulus
+    bulk = real.lame_lambda + 1j * imaginary.lame_lambda + 2 / 3 * G
+    np.testing.assert_allclose(G, SECANT.shear_modulus * FACTORS[convention](SECANT.damping))
+    nu = MIXED.poisson
+    expected = 2 * MIXED.shear_modulus * (1 + nu) / (3 * (1 - 2 * nu))  # small strain, undamped
+    np.testing.assert_allclose(bulk, expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize("keep", ["poisson", "bulk"])
+def test_without_damping_there_is_no_imaginary_part(keep):
+    real, imaginary = complex_constants(
+        MIXED, Moduli(SECANT.shear_modulus, np.zeros(3)), "shake91", keep
+    )
+    assert imaginary is None
+    np.testing.assert_array_equal(real.shear_modulus, SECANT.shear_modulus)
+
+
+# ---------------------------------------------------------------- the input and its lines
+
+
+def excitation(num_samples, lines, motions=2, dt=0.02) -> tuple[Excitation, np.ndarray]:
+    """Lines with random weights, and random transfer functions of four rows."""
+    rng = np.random.default_rng(num_samples)
+
+    def noise(*shape):
+        return rng.normal(size=shape) + 1j * rng.normal(size=shape)
+
+    lines = np.asarray(lines)
+    weights = noise(motions, len(lines))
+    whole = Excitation(lines, weights, tuple(range(motions)), num_samples, dt, len(lines))
+    return whole, noise(4, motions, len(lines))
+
+
+@pytest.mark.parametrize(
+    ("num_samples", "lines"),
+    [
+        (16, range(9)),  # with line 0 and Nyquist's
+        (15, range(8)),  # an odd number has no Nyquist line
+        (16, [0]),
+        (16, [8]),
+        (16, [3]),
+        (15, [7]),
+        (2, [0, 1]),
+        (17, [1, 4, 8]),
+    ],
+)
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+def test_weights_sum_the_response_at_any_sample(num_samples, lines, derivative):
+    given, h = excitation(num_samples, lines)
+    spectra = given.respond(h) * (1j * given.omega) ** derivative
+    history = given.to_time(spectra)
+    assert history.shape == (4, num_samples)
+    scale = np.abs(spectra).sum() / num_samples
+    for sample in range(num_samples):
+        weights = given.weights_at(sample * given.dt) * (1j * given.omega) ** derivative
+        summed = np.einsum("rmk,mk->r", h, weights).real
+        np.testing.assert_allclose(summed, history[:, sample], atol=100 * EPS * scale)
+    # The period closes.
+    period = given.weights_at(num_samples * given.dt)
+    np.testing.assert_allclose(
+        period, given.weights_at(0.0), atol=1000 * EPS * np.abs(period).max()
+    )
+
+
+def test_to_time_is_the_inverse_transform_with_zeros_elsewhere():
+    given, _ = excitation(20, [0, 2, 5, 10])
+    spectrum = np.zeros((2, 11), complex)
+    spectrum[:, [0, 2, 5, 10]] = given.weights
+    np.testing.assert_array_equal(given.to_time(given.weights), to_time(spectrum, 20))
+    np.testing.assert_allclose(given.frequency, np.array([0, 2, 5, 10]) / (20 * 0.02))
+
+
+def test_motions_add_up():
+    given, h = excitation(16, [1, 2, 3])
+    summed = sum(h[:, m] * given.weights[m] for m in range(2))
+    np.testing.assert_allclose(given.respond(h), summed, rtol=1e-14)
+    assert given.respond(h[None]).shape == (1, 4, 3)
+
+
+def test_a_pure_harmonic_excites_one_line():
+    harmonic = {"amplitude": 1.0, "frequency": 2.0, "cycles": 5, "samples": 400}
+    mesh = {"box": {"size": [1.0, 1.0], "cells": [1, 1]}}
+    case = scene(mesh, ("clay",), motion=[{"direction": "x", "harmonic": harmonic}])
+    given = excite(case, case.base_acceleration, (0,))
+    assert given.lines.tolist() == [5]
+    assert given.frequency.tolist() == pytest.approx([2.0])
+    assert given.excited == 1
+    np.testing.assert_allclose(given.to_time(given.weights), case.base_acceleration, atol=1e-14)
+
+
+def test_lines_above_the_limit_are_counted_but_not_solved():
+    synthetic = {"n": 400, "dt": 0.01, "f1": 1.0, "f2": 20.0, "t1": 0.5, "t2": 3.0}
+    motions = [
+        {"direction": "x", "synthetic": synthetic},
+        {
+            "direction": "y",
+            "harmonic": {"amplitude": 1e-6, "frequency": 40.0, "cycles": 160, "samples": 400},
+        },
+    ]
+    mesh = {"box": {"size": [1.0, 1.0], "cells": [1, 1]}}
+    solver = {"max_frequency": 10.0, "excited": 1e-3}
+    case = scene(mesh, ("clay",), motion=motions, solver=solver)
+    given = excite(case, case.base_acceleration, (0, 1))
+    spectra = np.abs(np.fft.rfft(case.base_acceleration))
+    above = (spectra > 1e-3 * spectra.max(axis=1, keepdims=True)).any(axis=0)
+    assert given.excited == np.count_nonzero(above)
+    assert above[160]  # the weak motion counts by its own peak
+    frequency = np.fft.rfftfreq(400, 0.01)
+    assert given.lines.tolist() == np.flatnonzero(above & (frequency <= 10.0)).tolist()
+    assert 0 < len(given.lines) < given.excited
+
+
+# ---------------------------------------------------------------- peaks of cells
+
+
+class FieldSweep:
+    """A sweep whose solutions are given nodal fields, on unknowns that are the nodes' own."""
+
+    def __init__(self, fields):
+        self.fields = fields  # (num_local, num_sides, num_lines)
+
+    def project(self, rows):
+        out = np.empty((rows.getLocalSize()[0], *self.fields.shape[1:]), complex)
+        x, y = rows.createVecRight(), rows.createVecLeft()
+        for side in range(self.fields.shape[1]):
+            for line in range(self.fields.shape[2]):
+                x.array[:] = self.fields[:, side, line]
+                rows.mult(x, y)
+                out[:, side, line] = y.array_r
+        return out
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("cell", ["quadrilateral", "tetrahedron"])
+def test_peaks_of_a_uniform_field(cell):
+    """h(x, ω) = H x at one line: strain, stress and total acceleration in closed form."""
+    gdim = 2 if cell == "quadrilateral" else 3
+    mesh = {"box": {"size": [2.0] * gdim, "cells": [2] * gdim, "cell": cell}}
+    domain = build(scene(mesh, ("clay",)), WORLD)
+    T = constraint_matrix(domain, {"base": "free"})
+    size = domain.V.dofmap.index_map.size_local
+    x = domain.V.tabulate_dof_coordinates()[:size, :gdim]
+    shear, amplitude, line = 1e-3 * np.exp(0.4j), 3.0, 4
+    H = np.zeros((gdim, gdim), complex)
+    H[0, -1] = shear  # u_x = γ z
+    fields = (x @ H.T).reshape(-1, 1, 1)
+    N, dt = 64, 0.05
+    weights = np.array([[amplitude * N / 2]], complex)
+    given = Excitation(np.array([line]), weights, (0,), N, dt, 1)
+    probe = CellProbe(domain, T, "plane")
+    sweep = FieldSweep(fields)
+    modulus = np.full(domain.num_cells, 20e6 * (1 + 0.3j))
+    peaks = probe.peaks(sweep, given, modulus)
+    # Sampled sixteen times a cycle from known phases: the peak over the samples, not the crest.
+    phase = 2 * np.pi * line * np.arange(N) / N
+    peak = np.abs(amplitude * np.real(shear * np.exp(1j * phase))).max()
+    np.testing.assert_allclose(peaks.strain, peak, rtol=1e-12)
+    np.testing.assert_allclose(probe.peak_strain(sweep, given), peak, rtol=1e-12)
+    stress = np.abs(amplitude * np.real(modulus[0] * shear * np.exp(1j * phase))).max()
+    np.testing.assert_allclose(peaks.stress, stress, rtol=1e-12)
+    omega = 2 * np.pi * line / (N * dt)
+    heights = domain.gather_cells(centroids(domain)[:, -1])
+    total = amplitude * np.real(
+        (1 - omega**2 * shear * heights[:, None]) * np.exp(1j * phase[None])
+    )
+    np.testing.assert_allclose(peaks.acceleration, np.abs(total).max(axis=1), rtol=1e-12)
+    probe.destroy()
+    T.destroy()
+
+
+def centroids(domain) -> np.ndarray:
+    nodes = domain.mesh.geometry.x[domain.mesh.geometry.dofmap[: domain.num_owned_cells]]
+    return nodes.mean(axis=1)[:, : domain.gdim]
+
+
+def test_at_rest_the_modulus_is_real():
+    domain = build(scene({"box": {"size": [1.0, 1.0], "cells": [1, 1]}}, ("clay",)), SELF)
+    T = constraint_matrix(domain, {"base": "free"})
+    x = domain.V.tabulate_dof_coordinates()[:, :2]
+    fields = (x @ np.array([[0, 1e-3], [0, 0]]).T).astype(complex).reshape(-1, 1, 1)
+    given = Excitation(np.array([0]), np.array([[8.0 + 0j]]), (0,), 8, 0.1, 1)
+    probe = CellProbe(domain, T, "plane")
+    peaks = probe.peaks(FieldSweep(fields), given, np.array([1e6 * (1 + 0.5j)]))
+    assert peaks.stress[0] == pytest.approx(1e3, rel=1e-12)
+    probe.destroy()
+    T.destroy()
