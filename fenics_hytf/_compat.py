@@ -62,6 +62,6 @@ def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
     )
 
 
-def geometry_element(mesh: Mesh):  # type: ignore[no-untyped-def]  # a pybind type
-    """Coordinate element of the mesh."""
-    return mesh.geometry.cmap
+def geometry_degree(mesh: Mesh) -> int:
+    """Degree of the cells' geometry."""
+    return int(mesh.geometry.cmap.degree)

@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from os import PathLike
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import rfft, rfftfreq
 from scipy.integrate import cumulative_trapezoid
 
 RealArray = npt.NDArray[np.float64]
@@ -106,15 +104,6 @@ class Record:
     def pga(self) -> float:
         """Largest absolute acceleration [m/s^2]."""
         return float(np.abs(self.acceleration).max())
-
-    @cached_property
-    def dominant_frequency(self) -> float:
-        """Frequency of the largest Fourier amplitude above 0 Hz [Hz]; 0 for a constant record."""
-        amplitude = np.abs(rfft(self.acceleration))
-        line = 1 + int(np.argmax(amplitude[1:]))
-        if amplitude[line] <= 1e-12 * self.pga * self.num_samples:  # round-off of a constant
-            return 0.0
-        return float(rfftfreq(self.num_samples, self.dt)[line])
 
     def velocity(self) -> RealArray:
         """Velocity from rest by the trapezoidal rule [m/s], shape ``(num_samples,)``."""

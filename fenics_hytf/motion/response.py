@@ -36,11 +36,11 @@ Shorter ones follow the record so closely that what rings on top is a small part
 """
 
 
-def default_periods(num: int = 100) -> RealArray:
+def default_periods(num: int = 181) -> RealArray:
     """Periods from 0.01 to 10 s, equally spaced in their logarithm.
 
     Args:
-        num: How many.
+        num: How many; 181 are 60 a decade.
 
     Returns:
         [s], shape ``(num,)``.

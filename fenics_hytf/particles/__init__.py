@@ -15,16 +15,18 @@ from fenics_hytf.particles.kinematics import (
 from fenics_hytf.particles.ledger import MassLedger
 from fenics_hytf.particles.mapping import inverse_map
 from fenics_hytf.particles.move import MoveReport, PointsNotFinite, PointsOutside, move
-from fenics_hytf.particles.points import Points, default_points_per_cell, quadrature_rule, seed
-from fenics_hytf.particles.search import locate, resolve_owners
+from fenics_hytf.particles.points import Points, quadrature_rule, seed
+from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
 from fenics_hytf.particles.sites import Located, Sites, cell_centres
 from fenics_hytf.particles.transfer import (
     gradient_matrices,
     particle_mass_matrix,
     transfer_matrix,
 )
+from fenics_hytf.scene import default_points_per_cell
 
 __all__ = [
+    "CellSearch",
     "Located",
     "MassLedger",
     "MoveReport",

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
 
-from fenics_hytf._compat import geometry_dofmap, geometry_element
+from fenics_hytf._compat import coordinate_element, geometry_dofmap
 
 RealArray = npt.NDArray[np.float64]
 
@@ -23,14 +22,6 @@ _CHUNK = 16384  # points tabulated at once: the tables stay in the cache
 def chunks(num_points: int) -> Iterator[slice]:
     """Consecutive slices that cover ``num_points`` points and keep tables small."""
     return (slice(i, min(i + _CHUNK, num_points)) for i in range(0, num_points, _CHUNK))
-
-
-def coordinate_element(mesh: Mesh) -> basix.finite_element.FiniteElement:
-    """The scalar basix element whose shape functions map the cells of ``mesh``."""
-    cmap = geometry_element(mesh)
-    return basix.create_element(
-        basix.ElementFamily.P, mesh.basix_cell(), cmap.degree, basix.LagrangeVariant(cmap.variant)
-    )
 
 
 def jacobians(mesh: Mesh, cells: npt.NDArray[np.int32], X: RealArray) -> RealArray:

@@ -236,7 +236,7 @@ def mesh_cell(mesh: Mesh) -> ReferenceCell:
             f"Found a mesh of dimension {tdim} in a space of dimension {gdim}; a point has "
             "coordinates in a cell only where the two are equal."
         )
-    return reference_cell(mesh.topology.cell_name(), _compat.geometry_element(mesh).degree)
+    return reference_cell(mesh.topology.cell_name(), _compat.geometry_degree(mesh))
 
 
 def cell_nodes(mesh: Mesh) -> npt.NDArray[np.float64]:
@@ -342,7 +342,8 @@ def inverse_map(
         X: Coordinates in basix's reference cell, shape (n, tdim), never NaN and never clipped. Of
             a point outside: the preimage outside the cell, or some place where there is none.
         status: Shape (n,). 0: inside, within the tolerances of this module. 1: outside. 2: unknown:
-            a coordinate that is not finite, no such cell, or a cell with a singular map.
+            a coordinate that is not finite, no such cell, a cell with a singular map, or Newton's
+            method did not converge from any start.
 
     Raises:
         ValueError: Arrays of the wrong shape, or a mesh without an inverse map.

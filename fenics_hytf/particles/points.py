@@ -23,6 +23,7 @@ from mpi4py import MPI
 
 from fenics_hytf.particles.geometry import RealArray, cell_grid
 from fenics_hytf.particles.ledger import MassLedger, exact_sum
+from fenics_hytf.scene import rule_degrees
 
 IntArray = npt.NDArray[np.int32]
 Arrays = dict[str, npt.NDArray[np.generic]]
@@ -184,32 +185,12 @@ def agree(comm: MPI.Comm, kind: type[Exception], message: str) -> None:
         raise kind(found[0])
 
 
-def default_points_per_cell(cell_type: str, degree: int) -> int:
-    """Points a cell needs so that M of that degree is regular.
-
-    Args:
-        cell_type: Name of the cell, as in ``"triangle"``.
-        degree: Displacement degree, 1 or 2.
-
-    Returns:
-        ``(degree + 1)^dim`` for quadrilaterals and hexahedra; for triangles and tetrahedra the
-        size of the rule that is exact to degree ``2 * degree``: 3 and 6, or 4 and 14.
-    """
-    cell = basix.CellType[cell_type]
-    return _rule(cell, 2 * degree)[1].size
-
-
 def quadrature_rule(cell_type: str, points_per_cell: int) -> tuple[RealArray, RealArray]:
-    """The rule that a cell's points are seeded on.
-
-    Quadrilaterals and hexahedra take Gauss points, m in each direction. Triangles and tetrahedra
-    take basix's default rule of that size, of the highest degree where several have it; the sizes
-    of squares and cubes, (k + 1)^dim, stand there for the rule exact to degree 2 k. Rules with a
-    negative weight are left out: no point weighs less than nothing.
+    """The rule that a cell's points are seeded on: basix's default one of that size.
 
     Args:
         cell_type: Name of the cell.
-        points_per_cell: How many points.
+        points_per_cell: How many points, see :func:`fenics_hytf.scene.rule_degrees`.
 
     Returns:
         Points on the reference cell, shape ``(q, tdim)``, and weights, shape ``(q,)``.
@@ -217,28 +198,13 @@ def quadrature_rule(cell_type: str, points_per_cell: int) -> tuple[RealArray, Re
     Raises:
         ValueError: If there is no rule of that size.
     """
-    cell = basix.CellType[cell_type]
-    tensor = cell_type in ("quadrilateral", "hexahedron")
-    dim = len(basix.topology(cell)) - 1
-    sizes = {}
-    for degree in range(1, 20 if tensor else 16):
-        X, w = _rule(cell, degree)
-        if np.all(w > 0):
-            sizes[w.size] = (X, w)
-    if not tensor:
-        for k in (1, 2):
-            sizes.setdefault((k + 1) ** dim, _rule(cell, 2 * k))
-    if points_per_cell not in sizes:
+    degrees = rule_degrees(cell_type)
+    if points_per_cell not in degrees:
         raise ValueError(
-            f"Found {points_per_cell} points a cell; expected for a {cell_type} one of "
-            f"{sorted(sizes)}."
+            f"points_per_cell: found {points_per_cell}; expected one of "
+            f"{', '.join(map(str, degrees))} for a {cell_type}"
         )
-    return sizes[points_per_cell]
-
-
-def _rule(cell: basix.CellType, degree: int) -> tuple[RealArray, RealArray]:
-    """Basix's default rule exact to a degree: points, shape ``(q, tdim)``, and weights."""
-    X, w = basix.make_quadrature(cell, degree)
+    X, w = basix.make_quadrature(basix.CellType[cell_type], degrees[points_per_cell])
     return np.asarray(X), np.asarray(w)
 
 

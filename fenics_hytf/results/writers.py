@@ -32,7 +32,7 @@ QUANTITIES = {
 """Letters in column names and what they stand for; ``A`` is total, the others are relative."""
 
 SPECTRUM_DAMPING = 0.05
-SPECTRUM_PERIODS = np.geomspace(0.01, 10.0, 181)  # 60 a decade
+SPECTRUM_PERIODS = default_periods()
 
 _BLOCK = 2048  # rows formatted at once
 

@@ -10,6 +10,11 @@ from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh
 from fenics_hytf.scene.motion import MotionInput
+from fenics_hytf.scene.quadrature import (
+    allowed_points_per_cell,
+    default_points_per_cell,
+    rule_degrees,
+)
 from fenics_hytf.scene.regions import Region
 from fenics_hytf.scene.scene import Scene, examine
 from fenics_hytf.scene.settings import (
@@ -44,7 +49,10 @@ __all__ = [
     "Sections",
     "Soil",
     "Solver",
+    "allowed_points_per_cell",
     "check",
     "default_kind",
+    "default_points_per_cell",
     "examine",
+    "rule_degrees",
 ]

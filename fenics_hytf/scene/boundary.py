@@ -3,24 +3,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 from fenics_hytf.scene.faults import NOT_YET, Fault, join_key, name_key, toml_text
 
 BOUNDARY_KINDS = ("rigid", "fixed", "roller", "tied", "free")
 LATER_BOUNDARY_KINDS = ("dashpot", "free_field", "compliant")
+AXES = ("x", "y", "z")
+NORMALS = {"left": "x", "right": "x", "front": "y", "back": "y"}  # base and top: the vertical
 PAIRS = {"left": "right", "right": "left", "front": "back", "back": "front"}
 
 
 def read_boundary(
-    raw: object, names: tuple[str, ...] | None, key: str = "boundary"
+    raw: object,
+    names: tuple[str, ...] | None,
+    directions: Collection[str] = (),
+    key: str = "boundary",
 ) -> tuple[dict[str, str] | None, list[Fault]]:
     """Read ``[boundary]``.
 
     Args:
         raw: What stands in the file: kinds by the name of the boundary.
         names: Boundaries that there are, or ``None`` where only the mesh file knows.
+        directions: Directions of the motions, as far as they can be read.
         key: Where it stands.
 
     Returns:
@@ -40,16 +46,33 @@ def read_boundary(
         return None, faults
     kinds = {str(name): str(kind) for name, kind in raw.items()}
     if names is not None:
-        all_kinds = {name: kinds.get(name, default_kind(name)) for name in names}
-        if not any(kind in ("rigid", "fixed", "roller") for kind in all_kinds.values()):
-            text = ", ".join(f"{name} {kind}" for name, kind in all_kinds.items())
-            return None, [Fault(key, text, "a boundary that moves with the base (rigid)")]
-    return kinds, []
+        faults += _base_faults(kinds, names, directions, key)
+    return (None if faults else kinds), faults
 
 
 def default_kind(name: str) -> str:
     """Kind of a boundary that the scene does not name: the base is rigid, others are free."""
     return "rigid" if name == "base" else "free"
+
+
+def _base_faults(
+    kinds: dict[str, str], names: tuple[str, ...], directions: Collection[str], key: str
+) -> Iterator[Fault]:
+    """Something moves with the base in the direction of every motion."""
+    all_kinds = {name: kinds.get(name, default_kind(name)) for name in names}
+    vertical = "z" if "front" in names else "y"
+    held: set[str] = set()
+    for name, kind in all_kinds.items():
+        if kind in ("rigid", "fixed"):
+            held.update(AXES)
+        elif kind == "roller":
+            held.add(NORMALS.get(name, vertical))
+    loose = [axis for axis in AXES if axis in directions and axis not in held]
+    if loose or not held:
+        where = f" in {' and '.join(loose)}" if loose else ""
+        text = ", ".join(f"{name} {kind}" for name, kind in all_kinds.items())
+        expected = f"a boundary that moves with the base{where}: rigid, fixed or a roller across it"
+        yield Fault(key, text, expected)
 
 
 def _kind_faults(kind: object, key: str) -> Iterator[Fault]:

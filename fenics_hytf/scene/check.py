@@ -28,7 +28,7 @@ from fenics_hytf.scene.settings import (
     read_output,
 )
 from fenics_hytf.scene.soil import Soil, read_curves, read_soils
-from fenics_hytf.scene.table import number, read_table, unknown_key
+from fenics_hytf.scene.table import as_list, number, read_table, unknown_key
 
 SECTIONS = (
     "title",
@@ -120,7 +120,8 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
     sections.motion, found = read_motions(raw.get("motion"), folder, gdim)
     faults += found
     names = None if drawn is None else drawn.boundaries
-    sections.boundary, found = read_boundary(raw.get("boundary", {}), names)
+    directions = [table.get("direction") for table in as_list(raw.get("motion")) if isinstance(table, dict)]
+    sections.boundary, found = read_boundary(raw.get("boundary", {}), names, directions)
     faults += found
     sections.lapses, found = read_table(Lapses, raw.get("lapses", {}), "lapses")
     faults += found

@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from fenics_hytf.scene.faults import Fault, join_key, toml_text
+from fenics_hytf.scene.faults import Fault, SceneError, join_key, toml_text
+from fenics_hytf.scene.quadrature import allowed_points_per_cell, default_points_per_cell
 from fenics_hytf.scene.regions import RealArray, Region, polygon_rules
 from fenics_hytf.scene.table import (
     Count,
@@ -130,8 +131,9 @@ class Mesh(Table):
         degree: Degree of the displacement, 1 or 2.
         kinematics: ``plane_strain`` in 2D, ``None`` in 3D and for a file that leaves it open.
         points_per_cell: Material points a cell, ``n**gdim`` for the Gauss rule with ``n`` points
-            a direction; ``None`` for ``n = degree + 1``. Triangles and tetrahedra take the rule
-            that integrates the same degree, ``2 n - 1``, with its own number of points.
+            a direction; ``None`` for ``n = degree + 1``. Triangles and tetrahedra have rules of
+            other sizes: by default, and for ``(degree + 1)**gdim``, the one that is exact to
+            degree ``2 * degree``. See :mod:`fenics_hytf.scene.quadrature`.
     """
 
     column: Column | None = Field(None, description="a table with width and layers")
@@ -141,7 +143,7 @@ class Mesh(Table):
     degree: Literal[1, 2] = Field(1, description="1 or 2")
     kinematics: Literal["plane_strain"] | None = Field(None, description='"plane_strain"')
     points_per_cell: Count | None = Field(
-        None, description="a square (2D) or cube (3D) of at least degree + 1"
+        None, description="a whole number that the cells have a quadrature rule for"
     )
 
     later: ClassVar[Mapping[str, str]] = {"empty": "every region needs a soil"}
@@ -167,7 +169,7 @@ class Mesh(Table):
                 yield from polygon_rules(region, where, gdim)
         if gdim == 3 and raw.get("kinematics") is not None:
             yield Fault(join_key(key, "kinematics"), toml_text(raw["kinematics"]), "nothing in 3D")
-        yield from _points_rules(raw, key, gdim)
+        yield from _points_rules(raw, key)
 
     @classmethod
     def prepare(cls, raw: dict[str, Any]) -> dict[str, Any]:
@@ -204,11 +206,24 @@ class Mesh(Table):
         names = [layer.soil for layer in self.column.layers] if self.column is not None else []
         return tuple(dict.fromkeys(names + [region.soil for region in self.regions]))
 
-    def points_per_direction(self, gdim: int) -> int:
-        """Points of the Gauss rule along one direction, ``n`` of ``n**gdim``."""
+    def points_in(self, cell_type: str) -> int:
+        """Points a cell, once the mesh file too has told its cell type.
+
+        Args:
+            cell_type: ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``.
+
+        Returns:
+            What the scene asks for, or the default.
+
+        Raises:
+            SceneError: If it asks for a number that such cells have no rule for.
+        """
         if self.points_per_cell is None:
-            return self.degree + 1
-        return round(self.points_per_cell ** (1 / gdim))
+            return default_points_per_cell(cell_type, self.degree)
+        faults = list(_points_faults(self.points_per_cell, self.degree, (cell_type,), "mesh"))
+        if faults:
+            raise SceneError(faults)
+        return self.points_per_cell
 
     def region_index(self, x: RealArray) -> npt.NDArray[np.int32]:
         """Which region each place of a box belongs to; the first that matches wins.
@@ -281,19 +296,33 @@ def raw_gdim(raw: object) -> int | None:
     return len(size) if isinstance(size, list | tuple) and len(size) in CELLS else None
 
 
-def _points_rules(raw: dict[str, Any], key: str, gdim: int | None) -> Iterator[Fault]:
-    """Points a cell: a whole power, and not fewer than (degree + 1)**gdim."""
+def _points_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:
+    """Points a cell, as far as the cell type is known."""
     points, degree = number(raw, "points_per_cell"), raw.get("degree", 1)
-    if points is None:
-        return
-    degree = degree if degree in (1, 2) else 1
-    least = {d: (degree + 1) ** d for d in ([gdim] if gdim else [2, 3])}
-    if not any(points >= n and round(points ** (1 / d)) ** d == points for d, n in least.items()):
-        shape = " or ".join(
-            f"{'a square' if d == 2 else 'a cube'} of at least {n}" for d, n in least.items()
-        )
-        expected = f"{shape} (degree {degree})"
-        yield Fault(join_key(key, "points_per_cell"), toml_text(raw["points_per_cell"]), expected)
+    if points is not None:
+        yield from _points_faults(points, degree if degree in (1, 2) else 1, _raw_cells(raw), key)
+
+
+def _raw_cells(raw: dict[str, Any]) -> tuple[str, ...]:
+    """The cell types that a raw ``[mesh]`` table leaves open, one where it is known."""
+    if raw.get("column") is not None:
+        return CELLS[2][:1]
+    gdim = raw_gdim(raw)
+    if gdim is None:
+        return CELLS[2] + CELLS[3]
+    cell = raw["box"].get("cell", CELLS[gdim][0])
+    return (cell,) if cell in CELLS[gdim] else CELLS[gdim]
+
+
+def _points_faults(
+    points: float, degree: int, cells: tuple[str, ...], key: str
+) -> Iterator[Fault]:
+    """There is a rule of that size, and M is regular under it, for one of the cell types."""
+    allowed = {cell: allowed_points_per_cell(cell, degree) for cell in cells}
+    if not any(points in counts for counts in allowed.values()):
+        text = "; ".join(f"{', '.join(map(str, n))} for a {cell}" for cell, n in allowed.items())
+        expected = f"one of {text} (degree {degree})"
+        yield Fault(join_key(key, "points_per_cell"), toml_text(points), expected)
 
 
 def _uncovered(mesh: Mesh, key: str) -> Iterator[Fault]:
