@@ -45,8 +45,8 @@ def describe(inspection: Inspection) -> str:
         ("unknowns", f"{inspection.unknowns}"),
         ("points", f"{inspection.points}"),
         ("lapses", lapses),
-        ("excited lines", solved),
-        ("factorisations", f"about {inspection.factorisations}"),
+        ("lines to solve", solved),
+        ("factorisations", f"at most {inspection.factorisations}"),
         ("memory", f"about {inspection.memory_bytes / 2**20:.0f} MiB"),
         *(("note", note) for note in inspection.notes),
     ]

@@ -108,7 +108,7 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
         plan = comm.bcast(at_root(comm, lambda: plan_demo(demo, request)))
         copies, faults, scene_hash = plan
         force = request.force or is_same_demo(request.folder, scene_hash)
-    faults += comm.bcast(folder_faults(request.folder, force) if comm.rank == 0 else None)
+    faults += comm.bcast(at_root(comm, lambda: folder_faults(request.folder, force)))
     if faults:
         raise InputError(faults)
     if copies is not None:

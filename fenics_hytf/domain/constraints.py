@@ -7,7 +7,7 @@ that of a partner across the mesh.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -16,13 +16,15 @@ from petsc4py import PETSc
 from scipy.spatial import KDTree
 
 from fenics_hytf.domain.domain import Domain
-from fenics_hytf.scene import Fault, SceneError
+from fenics_hytf.scene import Fault, SceneError, default_kind
 
 # Sides that tie to each other, and the axis across which they do.
 _TIED = (("left", "right", 0), ("front", "back", 1))
 
 
-def constraint_matrix(domain: Domain, boundary: Mapping[str, str]) -> PETSc.Mat:
+def constraint_matrix(
+    domain: Domain, boundary: Mapping[str, str], shaken: Sequence[int] = ()
+) -> PETSc.Mat:
     """Build T.
 
     Args:
@@ -30,6 +32,7 @@ def constraint_matrix(domain: Domain, boundary: Mapping[str, str]) -> PETSc.Mat:
         boundary: Kind of each boundary: ``rigid`` and ``fixed`` hold every component, ``roller``
             the normal one, ``tied`` sides move alike; ``free`` and unnamed ones are free, except
             that ``base`` is rigid unless it is named.
+        shaken: Components in which the base moves; something must be held in each.
 
     Returns:
         Matrix of zeros and ones, rows distributed as the displacement space, columns the unknowns
@@ -37,9 +40,9 @@ def constraint_matrix(domain: Domain, boundary: Mapping[str, str]) -> PETSc.Mat:
 
     Raises:
         SceneError: On every rank: tied sides whose nodes do not match, a roller that is not
-            parallel to an axis, or nothing left to solve for.
+            parallel to an axis, nothing that moves with the base, or nothing left to solve for.
     """
-    kinds = {"base": "rigid", **boundary}
+    kinds = {name: default_kind(name) for name in domain.boundaries} | dict(boundary)
     V = domain.V
     size = V.dofmap.index_map.size_local
     held = np.zeros((size + V.dofmap.index_map.num_ghosts, domain.gdim), bool)
@@ -49,9 +52,20 @@ def constraint_matrix(domain: Domain, boundary: Mapping[str, str]) -> PETSc.Mat:
         elif kind == "roller":
             held[_nodes(domain, name), _normal_axis(domain, name)] = True
     held = held[:size]
+    _require_base(domain, held, shaken)
     image = _tied_nodes(domain, kinds)
     _share_holds(domain, held, image)
     return _assemble(V, held, image)
+
+
+def _require_base(domain: Domain, held: npt.NDArray[np.bool_], shaken: Sequence[int]) -> None:
+    """Something moves with the base in every direction of the motion."""
+    found = domain.comm.allreduce(held.any(axis=0).astype(int))
+    loose = [domain.components[axis] for axis in shaken if not found[axis]]
+    if loose:
+        expected = "a boundary that is rigid, fixed, or on rollers across that direction"
+        what = f"nothing that moves with the base in {', '.join(loose)}"
+        raise SceneError([Fault("boundary", what, expected)])
 
 
 def _nodes(domain: Domain, name: str) -> npt.NDArray[np.int32]:

@@ -120,16 +120,24 @@ def build(scene: Scene, comm: MPI.Comm) -> Domain:
 
 
 def _on_rank_zero(comm: MPI.Comm, make: Callable[[], MeshData]) -> MeshData | None:
-    """Run on rank 0 only and raise its faults on every rank."""
-    data, faults = None, None
+    """Run on rank 0 only and raise its error on every rank."""
+    data, error = None, None
     if comm.rank == 0:
         try:
             data = make()
-        except SceneError as error:
-            faults = error.faults
-    faults = comm.bcast(faults)
-    if faults:
-        raise SceneError(faults)
+        except Exception as caught:  # whatever it is, the other ranks are waiting
+            error = caught
+    if isinstance(error, SceneError):
+        comm.bcast(("faults", error.faults))
+        raise error
+    if error is not None:
+        comm.bcast(("error", f"{type(error).__name__}: {error}"))
+        raise error
+    kind, content = comm.bcast(("", None))
+    if kind == "faults":
+        raise SceneError(content)
+    if kind == "error":
+        raise RuntimeError(f"the mesh could not be made on rank 0: {content}")
     return data
 
 
@@ -149,9 +157,6 @@ def _mesh_data(scene: Scene) -> MeshData:
     for name in scene.boundary:
         if name not in names:
             faults.append(Fault(f"boundary.{name}", "no such boundary in the mesh", known))
-    if "base" not in names and not {"rigid", "fixed"} & set(scene.boundary.values()):
-        expected = "a boundary named 'base', or one that the scene calls rigid"
-        faults.append(Fault("boundary", f"none that is held among {known}", expected))
     gdim = data.points.shape[1]
     if scene.mesh.kinematics and gdim == 3:
         faults.append(Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh"))

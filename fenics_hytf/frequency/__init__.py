@@ -2,7 +2,12 @@
 """Sweeps over frequencies of an affine complex symmetric system."""
 
 from fenics_hytf.frequency.direct import SymmetricFactorisation, direct_sweep
-from fenics_hytf.frequency.errors import FactorisationError, ResidualError, SweepError
+from fenics_hytf.frequency.errors import (
+    FactorisationError,
+    ResidualError,
+    ResonanceError,
+    SweepError,
+)
 from fenics_hytf.frequency.sweep import DenseSweep, Sweep
 from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction, constant, hysteretic
 
@@ -11,6 +16,7 @@ __all__ = [
     "DynamicSystem",
     "FactorisationError",
     "ResidualError",
+    "ResonanceError",
     "ScalarFunction",
     "Sweep",
     "SweepError",

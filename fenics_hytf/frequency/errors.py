@@ -29,6 +29,17 @@ class FactorisationError(SweepError):
         )
 
 
+class ResonanceError(SweepError):
+    """A line lies on an undamped resonance: the response there is not a number but a round-off."""
+
+    def __init__(self, s: complex, amplification: float) -> None:
+        super().__init__(
+            s,
+            f"found inertia forces {amplification:.3g} times the load, an undamped resonance; "
+            "expected damping, or a frequency beside the resonance",
+        )
+
+
 class ResidualError(SweepError):
     """The solution of a line does not satisfy its equations."""
 

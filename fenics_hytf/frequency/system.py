@@ -53,6 +53,7 @@ class DynamicSystem:
         stiffness: list[tuple[PETSc.Mat, ScalarFunction]] = [(K, constant)] if single else [*K]
         if not stiffness:
             raise ValueError("K: found no matrix; expected at least one")
+        self.mass = M
         self.terms: list[tuple[PETSc.Mat, ScalarFunction]] = [
             *stiffness,
             (M, lambda s: s * s),

@@ -48,10 +48,10 @@ class Equations:
         self._domain = domain
         self._effects = scene.effects
         self._assemblies = assemblies
-        self.T = constraint_matrix(domain, scene.boundary)
         self._elastic = ElasticForm(domain)
         self._geometric = GeometricForm(domain) if scene.effects.geometric_stiffness else None
-        self._directions = [domain.components.index(m.direction) for m in scene.motion]
+        self.axes = tuple(domain.components.index(m.direction) for m in scene.motion)
+        self.T = constraint_matrix(domain, scene.boundary, self.axes)
         self._K = self._elastic.create_matrix()
         # On the unknowns: mass, real, imaginary and geometric stiffness, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
@@ -81,7 +81,7 @@ class Equations:
         for side in self._sides:
             side.destroy()
         # M r on all nodes, before constraining: held ones pull on their neighbours too.
-        self._sides = [self._influence(M, direction) for direction in self._directions]
+        self._sides = [self._influence(M, direction) for direction in self.axes]
         self._constrain("mass", M)
         M.destroy()
 
@@ -116,19 +116,25 @@ class Equations:
         self._assemblies["elasticity"] += 1
         return self._constrain(name, self._K)
 
+    def stiffen(self, stress: npt.NDArray[np.float64]) -> None:
+        """Rebuild K_NL, for a scene that calls for geometric stiffness.
+
+        Args:
+            stress: Cauchy stress of each local cell [Pa], shape ``(num_local_cells, gdim, gdim)``.
+        """
+        if self._geometric is not None:
+            self._geometric.assemble(self._K, stress)
+            self._assemblies["geometric"] += 1
+            self._constrain("geometric", self._K)
+
     def assemble(
-        self,
-        real: ElasticConstants,
-        imaginary: ElasticConstants | None,
-        stress: npt.NDArray[np.float64] | None = None,
+        self, real: ElasticConstants, imaginary: ElasticConstants | None
     ) -> LapseEquations:
         """Assemble A(s) with the moduli of an iteration.
 
         Args:
             real: Real parts of the elastic constants, cells in the order of the input.
             imaginary: Imaginary parts, or ``None`` without material damping.
-            stress: Cauchy stress of each local cell [Pa], shape ``(num_local_cells, gdim, gdim)``,
-                where the scene calls for geometric stiffness.
 
         Returns:
             The equations, valid until the next call.
@@ -147,10 +153,8 @@ class Equations:
             self._assemblies["rayleigh"] += 1
         if imaginary is not None:
             terms.append((self._stiffness("imaginary", imaginary), hysteretic))
-        if self._geometric is not None and stress is not None:
-            self._geometric.assemble(self._K, stress)
-            self._assemblies["geometric"] += 1
-            terms.append((self._constrain("geometric", self._K), constant))
+        if "geometric" in self._constrained:
+            terms.append((self._constrained["geometric"], constant))
         return LapseEquations(DynamicSystem(terms, M, C), self._sides)
 
     def expand(self, q: npt.NDArray[np.complex128]) -> npt.NDArray[np.float64]:

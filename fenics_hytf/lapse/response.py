@@ -147,7 +147,8 @@ class ReceiverProbe:
         """Histories and transfer functions of all receivers, on every rank (collective)."""
         gdim, omega = self._domain.gdim, excitation.omega
         mine = sweep.project(self._rows)
-        h = np.zeros((self._count, gdim, len(excitation.axes), len(omega)), complex)
+        # A receiver that no rank holds rode a point that has left the mesh: not a number.
+        h = np.full((self._count, gdim, len(excitation.axes), len(omega)), np.nan, complex)
         for numbers, part in self._domain.comm.allgather((self._numbers, mine)):
             h[numbers] = part.reshape(len(numbers), gdim, *part.shape[1:])
         transfer = -(omega**2) * h

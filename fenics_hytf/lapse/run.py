@@ -95,20 +95,18 @@ def solve(
     probe: CellProbe,
     start: RealArray,
     observer: Observer,
-    stress: RealArray | None = None,
     strain_from: npt.NDArray[np.intp] | None = None,
 ) -> Solved:
     """Solve a lapse: one sweep, or the equivalent-linear loop round it.
 
     Args:
         scene: The scene.
-        equations: The equations, their mass weighed.
+        equations: The equations, their mass weighed and their stress carried.
         ground: The ground.
         excitation: The input.
         probe: Evaluates strain in the cells.
         start: First effective strain of every cell [-], shape ``(num_cells,)``.
         observer: Where to report.
-        stress: Stress for the geometric stiffness, see :meth:`Equations.assemble`.
         strain_from: See :func:`iterate`.
 
     Returns:
@@ -125,7 +123,7 @@ def solve(
     def sweep_with(moduli: Moduli, iteration: int) -> Sweep:
         with observer.phase("assembly"):
             parts = complex_constants(ground, moduli, solver.complex_modulus, solver.keep)
-            lapse = equations.assemble(*parts, stress)
+            lapse = equations.assemble(*parts)
         with observer.phase("sweep"):
             sweep = direct_sweep(
                 lapse.system,

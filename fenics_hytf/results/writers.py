@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.motion import response_spectrum
+from fenics_hytf.motion import default_periods, response_spectrum
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult

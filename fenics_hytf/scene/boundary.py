@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""The ``[boundary]`` section: what holds each boundary, by its name."""
+"""The ``[boundary]`` section: what holds each boundary, by its name.
+
+Motions are those of the base: what a boundary holds moves with it. A roller holds the direction
+normal to its boundary.
+"""
 
 from __future__ import annotations
 
@@ -60,14 +64,14 @@ def _base_faults(
 ) -> Iterator[Fault]:
     """Something moves with the base in the direction of every motion."""
     all_kinds = {name: kinds.get(name, default_kind(name)) for name in names}
-    vertical = "z" if "front" in names else "y"
+    axes = AXES[: 3 if "front" in names else 2]
     held: set[str] = set()
     for name, kind in all_kinds.items():
         if kind in ("rigid", "fixed"):
-            held.update(AXES)
+            held.update(axes)
         elif kind == "roller":
-            held.add(NORMALS.get(name, vertical))
-    loose = [axis for axis in AXES if axis in directions and axis not in held]
+            held.add(NORMALS.get(name, axes[-1]))
+    loose = [axis for axis in axes if axis in directions and axis not in held]
     if loose or not held:
         where = f" in {' and '.join(loose)}" if loose else ""
         text = ", ".join(f"{name} {kind}" for name, kind in all_kinds.items())

@@ -120,7 +120,8 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
     sections.motion, found = read_motions(raw.get("motion"), folder, gdim)
     faults += found
     names = None if drawn is None else drawn.boundaries
-    directions = [table.get("direction") for table in as_list(raw.get("motion")) if isinstance(table, dict)]
+    tables = [table for table in as_list(raw.get("motion")) if isinstance(table, dict)]
+    directions = [str(table.get("direction")) for table in tables]
     sections.boundary, found = read_boundary(raw.get("boundary", {}), names, directions)
     faults += found
     sections.lapses, found = read_table(Lapses, raw.get("lapses", {}), "lapses")

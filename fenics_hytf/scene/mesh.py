@@ -298,9 +298,9 @@ def raw_gdim(raw: object) -> int | None:
 
 def _points_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:
     """Points a cell, as far as the cell type is known."""
-    points, degree = number(raw, "points_per_cell"), raw.get("degree", 1)
-    if points is not None:
-        yield from _points_faults(points, degree if degree in (1, 2) else 1, _raw_cells(raw), key)
+    degree = raw["degree"] if raw.get("degree") in (1, 2) else 1
+    if number(raw, "points_per_cell") is not None:
+        yield from _points_faults(raw["points_per_cell"], degree, _raw_cells(raw), key)
 
 
 def _raw_cells(raw: dict[str, Any]) -> tuple[str, ...]:
@@ -314,9 +314,7 @@ def _raw_cells(raw: dict[str, Any]) -> tuple[str, ...]:
     return (cell,) if cell in CELLS[gdim] else CELLS[gdim]
 
 
-def _points_faults(
-    points: float, degree: int, cells: tuple[str, ...], key: str
-) -> Iterator[Fault]:
+def _points_faults(points: float, degree: int, cells: tuple[str, ...], key: str) -> Iterator[Fault]:
     """There is a rule of that size, and M is regular under it, for one of the cell types."""
     allowed = {cell: allowed_points_per_cell(cell, degree) for cell in cells}
     if not any(points in counts for counts in allowed.values()):

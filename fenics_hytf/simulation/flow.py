@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import logging
 import resource
 from collections import Counter
 from dataclasses import replace
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fenics_hytf import _compat
 from fenics_hytf.domain import Domain, build
 from fenics_hytf.frequency import SweepError
 from fenics_hytf.lapse import (
@@ -37,7 +39,7 @@ from fenics_hytf.particles import (
     default_points_per_cell,
     seed,
 )
-from fenics_hytf.scene import Scene
+from fenics_hytf.scene import Fault, Scene, SceneError
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.receivers import Receivers
@@ -52,6 +54,8 @@ from fenics_hytf.simulation.snapshots import take_snapshot
 from fenics_hytf.soil import complex_factor
 
 RealArray = npt.NDArray[np.float64]
+
+logger = logging.getLogger(__name__)
 
 
 def simulate(
@@ -77,21 +81,24 @@ def simulate(
 
     Raises:
         SceneError: A fault that only the mesh shows.
-        SimulationError: The numerics stopped; it holds the lapses before.
+        SimulationError: The numerics stopped; it holds the lapses that were solved.
     """
     run = _Run(scene, comm, progress, strain_from)
+    index = 0
     try:
+        run.set_up()
         for segment in scene.segments:
+            index = segment.index
             run.weigh()
-            solved = run.solve_lapse(segment.index, scene.base_acceleration[:, segment.samples])
-            run.observe(solved, segment.index, segment.start)
+            solved = run.solve_lapse(index, scene.base_acceleration[:, segment.samples])
+            run.observe(solved, index, segment.start)
             run.convect(solved)
-            if snapshot is not None and (segment.index + 1) % scene.output.every == 0:
-                run.show(solved, segment.index, segment.stop, snapshot)
+            if snapshot is not None and (index + 1) % scene.output.every == 0:
+                run.show(solved, index, segment.stop, snapshot)
         return run.result()
     except (SweepError, LapseError, PointsOutside, PointsNotFinite) as error:
         partial = run.result() if run.lapses else None
-        raise SimulationError(len(run.lapses), str(error), partial) from error
+        raise SimulationError(index, str(error), partial) from error
     finally:
         run.destroy()
 
@@ -107,6 +114,7 @@ class _Run:
         strain_from: npt.NDArray[np.intp] | None,
     ) -> None:
         self.scene = scene
+        self.comm = comm
         self.clock = Clock()
         self.lapses: list[LapseResult] = []
         self._work = Work(wall_s=self.clock.wall_s)
@@ -115,38 +123,43 @@ class _Run:
         self._strain_from = strain_from
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
+        self._owned: list[Equations | CellProbe] = []
+
+    def set_up(self) -> None:
+        """Mesh, points, receivers, and the operators that last for the whole run."""
+        scene = self.scene
         with self.clock.phase("setup"):
-            self.domain = build(scene, comm)
+            self.domain = build(scene, self.comm)
             self.points = seed_points(scene, self.domain)
             self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
             self.equations = Equations(scene, self.domain, self._assemblies)
+            self._owned.append(self.equations)
             loop = scene.effects.equivalent_linear
             self._probe = CellProbe(
                 self.domain, self.equations.T, loop.strain if loop is not None else "plane"
             )
-        self._axes = tuple(self.domain.components.index(m.direction) for m in scene.motion)
-        self._ledger = self.points.ledger(comm)
+            self._owned.append(self._probe)
+        self._ledger = self.points.ledger(self.comm)
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        self._probe.destroy()
-        self.equations.destroy()
+        for owned in self._owned:
+            owned.destroy()
 
     def weigh(self) -> None:
-        """M = SᵀM_pS (4) and the soil of each cell, from the points where they are now."""
+        """M = SᵀM_pS (4), K_NL and the soil of each cell, from the points where they are now."""
         if self._ground is not None and not self.scene.effects.convection:
             return
         with self.clock.phase("assembly"):
             self._ground = survey(self.scene, self.domain, self.points)
             self.equations.weigh(self.points)
+            if self.scene.effects.geometric_stiffness:
+                self.equations.stiffen(cell_stress(self.domain, self.points))
 
     def solve_lapse(self, index: int, acceleration: RealArray) -> Solved:
         """Transfer functions (5) of the lapse, with moduli that fit its strain."""
         assert self._ground is not None
-        excitation = excite(self.scene, acceleration, self._axes)
-        stress = None
-        if self.scene.effects.geometric_stiffness:
-            stress = cell_stress(self.domain, self.points)
+        excitation = excite(self.scene, acceleration, self.equations.axes)
         solved = solve(
             self.scene,
             self.equations,
@@ -155,7 +168,6 @@ class _Run:
             self._probe,
             self._first_strain(),
             self._observer(index),
-            stress,
             self._strain_from,
         )
         self._effective_strain = solved.effective_strain
@@ -185,8 +197,10 @@ class _Run:
             probe = ReceiverProbe(
                 self.domain, self.equations.T, sites, numbers, len(self.receivers.names)
             )
-            histories = probe.histories(solved.sweep, excitation)
-            probe.destroy()
+            try:
+                histories = probe.histories(solved.sweep, excitation)
+            finally:
+                probe.destroy()
             cells = self._cell_state(solved)
             carried = self.receivers.carried(self.points)
         self.lapses.append(
@@ -233,7 +247,7 @@ class _Run:
 
     def _centroids(self) -> RealArray:
         mesh = self.domain.mesh
-        nodes = mesh.geometry.x[mesh.geometry.dofmap[: self.domain.num_owned_cells]]
+        nodes = mesh.geometry.x[_compat.geometry_dofmap(mesh)[: self.domain.num_owned_cells]]
         return self.domain.gather_cells(nodes.mean(axis=1)[:, : self.domain.gdim])
 
     def convect(self, solved: Solved) -> None:
@@ -288,8 +302,14 @@ class _Run:
         )
 
     def _report(self, index: int, phase: str, **values: float) -> None:
-        if self._progress is not None:
-            self._progress(Progress(index, len(self.scene.segments), phase, **values))  # type: ignore[arg-type]
+        if self._progress is None:
+            return
+        report = Progress(index, len(self.scene.segments), phase, **values)  # type: ignore[arg-type]
+        try:
+            self._progress(report)
+        except Exception:  # rank 0 alone must not leave a run that others wait in
+            logger.warning("the progress callback failed and is not called again", exc_info=True)
+            self._progress = None
 
     def result(self) -> Result:
         """Everything so far."""
@@ -326,6 +346,9 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
 
     Returns:
         The points of this rank.
+
+    Raises:
+        SceneError: The mesh's cells have no rule of so many points.
     """
     fields = []
     if scene.effects.convection:
@@ -335,4 +358,11 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
     density = [scene.soil[name].density for name in domain.region_names]
     cell_type = domain.mesh.topology.cell_name()
     count = scene.mesh.points_per_cell or default_points_per_cell(cell_type, scene.mesh.degree)
+    try:
+        try:
+        quadrature_rule(cell_type, count)
+    except ValueError as error:
+        raise SceneError([fault_from(error, "mesh.points_per_cell", str(count))]) from error
     return seed(domain.mesh, domain.regions, density, count, fields)
+    except ValueError as error:  # a number of points that the mesh file's cells have no rule for
+        raise SceneError([Fault("mesh.points_per_cell", str(count), str(error))]) from error

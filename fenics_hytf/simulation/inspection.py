@@ -66,10 +66,10 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     domain = build(scene, comm)
     points = seed_points(scene, domain)
     Receivers(domain, points, scene.output.receivers)
-    T = constraint_matrix(domain, scene.boundary)
+    axes = tuple(domain.components.index(m.direction) for m in scene.motion)
+    T = constraint_matrix(domain, scene.boundary, axes)
     unknowns = int(T.getSize()[1])
     T.destroy()
-    axes = tuple(domain.components.index(m.direction) for m in scene.motion)
     lines = tuple(
         len(excite(scene, scene.base_acceleration[:, s.samples], axes).lines)
         for s in scene.segments
@@ -108,4 +108,6 @@ def _notes(scene: Scene, lines: tuple[int, ...]) -> tuple[str, ...]:
         notes.append("convection acts between lapses; the scene has one")
     if scene.effects.convection:
         notes.append("under steady continuity the net movement of the points in a lapse is zero")
+    if scene.effects.geometric_stiffness:
+        notes.append("the points start without stress: geometric_stiffness adds nothing yet")
     return tuple(notes)

@@ -49,7 +49,9 @@ class Receivers:
         """Cell of each fixed receiver where this rank owns it, else -1."""
         domain = self._domain
         cells, X = locate(domain.mesh, self.places[self._fixed])
-        claims = np.where(cells >= 0, domain.input_cells[cells], -1)
+        found = cells >= 0
+        claims = np.full(len(cells), -1, np.int64)
+        claims[found] = domain.input_cells[cells[found]]
         _, owner = resolve_owners(domain.comm, claims)
         faults = [
             Fault(
@@ -102,7 +104,8 @@ class Receivers:
             points: The points.
 
         Returns:
-            [m], zero for fixed places, shape ``(num_receivers, gdim)``, the same on every rank.
+            [m], zero for fixed places and for points that have left the mesh, shape
+            ``(num_receivers, gdim)``, the same on every rank.
         """
         offset = np.zeros((len(self.names), self._domain.gdim))
         if len(self._ids):

@@ -89,7 +89,7 @@ def take_snapshot(
 def _instant_of_peak(lapse: LapseResult) -> float:
     if not lapse.displacement.size:
         return lapse.num_samples // 2 * lapse.dt
-    distance = np.linalg.norm(lapse.displacement, axis=1)
+    distance = np.nan_to_num(np.linalg.norm(lapse.displacement, axis=1))
     return int(np.argmax(distance.max(axis=0))) * lapse.dt
 
 

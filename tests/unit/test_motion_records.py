@@ -81,11 +81,3 @@ def test_velocity_of_constant_and_linear_acceleration():
     assert record(np.full(50, 2.0)).velocity() == pytest.approx(2.0 * t, rel=1e-13, abs=1e-13)
     # the trapezoidal rule is exact for straight lines, but for round-off of 50 sums
     assert record(t).velocity() == pytest.approx(0.5 * t**2, rel=1e-13, abs=1e-13)
-
-
-def test_dominant_frequency():
-    t = 0.01 * np.arange(1000)
-    r = Record(5.0 + np.sin(2 * np.pi * 1.5 * t) + 0.9 * np.sin(2 * np.pi * 4.0 * t), 0.01)
-    assert r.dominant_frequency == pytest.approx(1.5, rel=1e-14)  # a line of the transform
-    assert record([0.1] * 7).dominant_frequency == 0.0
-    assert record([0.0] * 7).dominant_frequency == 0.0

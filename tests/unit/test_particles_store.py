@@ -21,6 +21,7 @@ from fenics_hytf.particles import (
     update_stress,
 )
 from fenics_hytf.particles.ledger import exact_sum, rounded
+from fenics_hytf.scene.faults import fault_from
 
 EPS = np.finfo(np.float64).eps
 CELLS = ["triangle", "quadrilateral", "tetrahedron", "hexahedron"]
@@ -118,9 +119,12 @@ def test_rules_by_size():
     # squares and cubes stand for the rule of that order
     assert quadrature_rule("triangle", 4)[1].size == default_points_per_cell("triangle", 1)
     assert quadrature_rule("tetrahedron", 27)[1].size == default_points_per_cell("tetrahedron", 2)
-    with pytest.raises(ValueError, match=r"Found 5 points a cell.*\[1, 4, 9"):
+    assert quadrature_rule("hexahedron", 1000)[1].size == 1000
+    with pytest.raises(ValueError, match=r"points_per_cell: found 5; expected one of 1, 4, 9") as e:
         quadrature_rule("quadrilateral", 5)
-    with pytest.raises(ValueError, match="expected for a tetrahedron"):
+    fault = fault_from(e.value, "mesh.points_per_cell", "")  # the message reads as a scene's fault
+    assert (fault.key, fault.found) == ("mesh.points_per_cell", "5")
+    with pytest.raises(ValueError, match="for a tetrahedron"):
         quadrature_rule("tetrahedron", 5)  # basix has one, with a negative weight
 
 
@@ -176,7 +180,7 @@ def test_a_region_of_density_zero_stays_empty():
         (0, [-1.0], 4, "none negative"),
         (0, [np.nan], 4, "finite"),
         (NO_REGION, [1.0], 4, "numbers from 0 to 0"),
-        (0, [1.0], 3, "Found 3 points a cell"),
+        (0, [1.0], 3, "points_per_cell: found 3; expected one of 1, 4"),
         (None, [1.0], 4, "Found regions of 0 cells"),
     ],
 )

@@ -2,10 +2,12 @@
 import tomllib
 from pathlib import Path
 
+import basix
 import numpy as np
 import pytest
 
 from fenics_hytf.motion import GRAVITY
+from fenics_hytf.particles import quadrature_rule
 from fenics_hytf.scene import Scene, SceneError, check, examine
 
 COLUMN = """
@@ -75,7 +77,7 @@ def test_the_file_is_mirrored():
 def test_defaults():
     s = scene(COLUMN)
     assert (s.mesh.degree, s.mesh.kinematics, s.mesh.points_per_cell) == (1, "plane_strain", None)
-    assert s.mesh.points_per_direction(2) == 2
+    assert s.mesh.points_in("quadrilateral") == 4
     assert s.boundary == {}
     assert (s.lapses.count, s.lapses.duration, s.lapses.continuity) == (1, None, "steady")
     assert s.effects.named == ()
@@ -199,10 +201,62 @@ def test_cell_types(size, cells, cell, default):
     assert mesh.region_index(np.zeros((2, mesh.gdim))).tolist() == [0, 0]
 
 
-@pytest.mark.parametrize(("degree", "points", "n"), [(1, 4, 2), (1, 9, 3), (2, 9, 3), (2, 25, 5)])
-def test_points_per_cell(degree, points, n):
-    extra = f"degree = {degree}\npoints_per_cell = {points}\n[soil.fill]"
-    assert scene(COLUMN.replace("[soil.fill]", extra)).mesh.points_per_direction(2) == n
+CELLS = {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 3}
+
+
+def of_cells(cell, degree, points):
+    size = [1.0] * CELLS[cell]
+    data = tomllib.loads(COLUMN)
+    data["soil"] = {"sand": data["soil"]["sand"]}
+    box = {"size": size, "cells": [1] * len(size), "cell": cell}
+    data["mesh"] = {"box": box, "degree": degree, "points_per_cell": points}
+    return data
+
+
+@pytest.mark.parametrize("cell", CELLS)
+@pytest.mark.parametrize("degree", [1, 2])
+def test_points_per_cell_are_those_that_there_are_rules_for(cell, degree):
+    # every number that the scene takes has a rule under which M is regular, and no other is taken
+    taken = []
+    for points in range(1, 1400):
+        faults = check(of_cells(cell, degree, points), ".")[1]
+        if faults:
+            assert [fault.key for fault in faults] == ["mesh.points_per_cell"]
+            assert faults[0].found == str(points) and cell in faults[0].expected
+        else:
+            taken.append(points)
+    for points in taken:
+        X, w = quadrature_rule(cell, points)
+        assert w.sum() == pytest.approx(quadrature_rule(cell, 1)[1].sum(), rel=1e-13)  # rounding
+        element = basix.create_element(basix.ElementFamily.P, basix.CellType[cell], degree)
+        N = element.tabulate(0, X)[0, :, :, 0]
+        assert np.linalg.matrix_rank(N) == element.dim  # so is N^T diag(w) N, w > 0
+    least = {  # counted by hand: Gauss points; rules exact to degrees 2 and 4
+        "triangle": (3, 6),
+        "quadrilateral": (4, 9),
+        "tetrahedron": (4, 14),
+        "hexahedron": (8, 27),
+    }
+    dim = CELLS[cell]
+    assert taken[0] == least[cell][degree - 1]
+    assert (degree + 1) ** dim in taken
+    if cell in ("quadrilateral", "hexahedron"):
+        assert taken == [m**dim for m in range(degree + 1, 11)]
+
+
+def test_points_per_cell_of_a_file_wait_for_its_cells(tmp_path):
+    (tmp_path / "a.msh").write_text("")
+    data = of_cells("triangle", 2, 6)
+    data["mesh"] = {"file": "a.msh", "degree": 2, "points_per_cell": 6}
+    mesh = Scene.from_dict(data, tmp_path).mesh
+    assert mesh.points_in("triangle") == 6
+    for cell in ("quadrilateral", "tetrahedron", "hexahedron"):
+        with pytest.raises(SceneError, match=rf"^mesh\.points_per_cell: found 6; .*{cell}"):
+            mesh.points_in(cell)
+    data["mesh"]["points_per_cell"] = 5  # no cell has a rule of five points
+    (fault,) = check(data, tmp_path)[1]
+    assert fault.key == "mesh.points_per_cell"
+    assert all(cell in fault.expected for cell in CELLS)
 
 
 def test_motion_is_read_and_scaled(at2):

@@ -112,8 +112,8 @@ def test_the_scene_itself_is_good():
         ({"mesh__box": BOX}, "mesh", "column and box", "exactly one of column, box, file"),
         ({"mesh__column": ...}, "mesh", "none of them", "exactly one of column, box, file"),
         ({"mesh__degree": 3}, "mesh.degree", "3", "1 or 2"),
-        ({"mesh__points_per_cell": 4}, "mesh.points_per_cell", "4", "a square of at least 9"),
-        ({"mesh__points_per_cell": 10}, "mesh.points_per_cell", "10", "a square of at least 9"),
+        ({"mesh__points_per_cell": 4}, "mesh.points_per_cell", "4", "one of 9, 16, 25"),
+        ({"mesh__points_per_cell": 10}, "mesh.points_per_cell", "10", "one of 9, 16, 25"),
         ({"mesh__regions": [{"soil": "sand"}]}, "mesh.regions", "[{", "with box only"),
         ({"mesh__column__layers__0__soil": "mud"}, "mesh.column.layers[0].soil", '"mud"', "fill"),
         ({"mesh__file": "no.msh"}, "mesh.file", '"no.msh", which is not there', "looked for /"),
@@ -173,7 +173,9 @@ def test_the_scene_itself_is_good():
         ({"boundary__top": ["tied"]}, "boundary.top", "[", "rigid, fixed, roller"),
         ({"boundary__right": ...}, "boundary.left", "but right is \"free\"", 'right = "tied"'),
         ({"boundary__top": "tied"}, "boundary.top", '"tied"', "pairs"),
-        ({"boundary__base": "free"}, "boundary", "base free", "moves with the base"),
+        ({"boundary__base": "free"}, "boundary", "base free", "with the base in x and y: rigid"),
+        ({"boundary__base": "roller"}, "boundary", "base roller", "moves with the base in x:"),
+        ({"boundary": {"base": "free", "right": "roller"}}, "boundary", "right roller", "in y:"),
         # time
         ({"lapses__duration": 1.0}, "lapses", "count and duration", "at most one"),
         ({"lapses__count": 10}, "lapses.count", "10 lapses", "at least 2 samples"),
@@ -279,6 +281,34 @@ def test_faults_of_a_box(data, key, found):
     got = faults(data)
     assert [fault.key for fault in got] == [key]
     assert found in got[0].found
+
+
+@pytest.mark.parametrize(
+    ("boundary", "directions", "loose"),
+    [
+        ({"left": "roller", "right": "roller"}, "xy", ""),
+        ({"left": "tied", "right": "tied"}, "xy", ""),
+        ({"base": "roller", "left": "roller"}, "xy", ""),
+        ({"base": "roller", "top": "fixed"}, "xy", ""),
+        ({"base": "roller"}, "y", ""),
+        ({"base": "roller", "left": "tied", "right": "tied"}, "x", "x"),
+        ({"base": "roller", "top": "roller"}, "x", "x"),
+        ({"base": "free", "left": "roller"}, "xy", "y"),
+        ({"base": "roller"}, "xyz", "x and y"),
+        ({"base": "roller", "left": "roller"}, "xyz", "y"),
+        ({"base": "roller", "left": "roller", "back": "roller"}, "xyz", ""),
+        ({"base": "free", "left": "roller", "back": "roller"}, "xyz", "z"),
+    ],
+)
+def test_every_motion_is_that_of_a_boundary(boundary, directions, loose):
+    motions = [{**GOOD["motion"][1], "direction": axis} for axis in directions]
+    data = changed(boundary=boundary, motion=motions)
+    if "z" in directions:
+        data = box(mesh={"regions": [{"soil": "sand"}]}, size=[4, 2, 1], cells=[4, 2, 1])
+        data |= {"boundary": boundary, "motion": motions}
+    got = faults(data)
+    assert [fault.key for fault in got] == ["boundary"] * bool(loose)
+    assert all(f"moves with the base in {loose}: " in fault.expected for fault in got)
 
 
 def test_every_fault_at_once():
