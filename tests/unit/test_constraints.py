@@ -190,9 +190,9 @@ def on_rank_zero(write, path):
     return {"file": str(path)}
 
 
-def refused(domain, boundary) -> dict[str, str]:
+def refused(domain, boundary, shaken=()) -> dict[str, str]:
     with pytest.raises(SceneError) as caught:
-        constraint_matrix(domain, boundary)
+        constraint_matrix(domain, boundary, shaken)
     return {fault.key: f"{fault.found}; {fault.expected}" for fault in caught.value.faults}
 
 
@@ -247,6 +247,24 @@ def test_a_roller_on_a_slope(shared_path):
     )
     found = refused(domain, {"bent": "roller"})["boundary.bent"]
     assert found.startswith("a side that is not parallel to an axis; a vertical or horizontal side")
+
+
+def test_nothing_moves_with_the_base():
+    domain = box([2.0, 1.0], [2, 1], "quadrilateral")
+    rollers = {"base": "roller"}
+    assert "in x;" in refused(domain, rollers, [0])["boundary"]
+    assert "in x;" in refused(domain, rollers, [0, 1])["boundary"]
+    assert "in x, y;" in refused(domain, {"base": "free"}, [0, 1])["boundary"]
+    for boundary, shaken in (({}, [0, 1]), (rollers, [1]), ({**rollers, "left": "roller"}, [0, 1])):
+        constraint_matrix(domain, boundary, shaken).destroy()
+
+
+def test_a_file_without_base_holds_what_it_is_told(shared_path):
+    groups = {"clay": (2, [1]), "sand": (2, [2]), "left": (1, [4, 7])}
+    mesh = on_rank_zero(lambda path: gmsh_section(path, groups=groups), shared_path / "a.msh")
+    domain = build(scene(mesh), WORLD)
+    assert "nothing that moves with the base" in refused(domain, {}, [0])["boundary"]
+    constraint_matrix(domain, {"left": "fixed"}, [0]).destroy()
 
 
 def test_nothing_left_to_solve_for():
