@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from fenics_hytf.cli.outcome import InputError, WriteError
 from fenics_hytf.results import ResultError
-from fenics_hytf.scene import Scene, SceneError
+from fenics_hytf.scene import Fault, Scene, SceneError, examine
+from fenics_hytf.simulation import mesh_faults
 
 T = TypeVar("T")
 
@@ -80,7 +81,10 @@ def load_scene(
     Returns:
         The scene, ``None`` on every rank if any refused it; and the faults.
     """
-    try:
-        return agree(comm, lambda: Scene.load(path, overrides, motion)), []
-    except InputError as error:
-        return None, error.faults
+    sections, faults = agree(comm, lambda: examine(path, overrides, motion))
+    refused: list[Fault] = next((found for found in comm.allgather(faults) if found), [])
+    if not refused:
+        return Scene.from_sections(sections), []
+    if comm.allreduce(sections.mesh is not None, MPI.LAND):
+        refused = refused + mesh_faults(sections, comm)[1]
+    return None, list(dict.fromkeys(str(fault) for fault in refused))

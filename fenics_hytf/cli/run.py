@@ -30,7 +30,7 @@ from fenics_hytf.cli.outcome import (
 from fenics_hytf.cli.progress import show_progress
 from fenics_hytf.results import ResultFolder, folder_faults, open_result, publish
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation import Result, SimulationError, Snapshot, simulate
+from fenics_hytf.simulation import Result, SimulationError, Snapshot, mesh_faults, simulate
 
 Command = Callable[[RunRequest, MPI.Comm], int]
 
@@ -100,6 +100,7 @@ def run_scene(request: RunRequest, comm: MPI.Comm) -> int:
 def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
     """The scene, and whether a finished result may be replaced; after a look for all faults."""
     copies: list[Copy] | None = None
+    scene: Scene | None = None
     if request.demo is None:
         scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
         force = request.force
@@ -109,6 +110,8 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
         copies, faults, scene_hash = plan
         force = request.force or is_same_demo(request.folder, scene_hash)
     faults += comm.bcast(at_root(comm, lambda: folder_faults(request.folder, force)))
+    if faults and scene is not None:
+        faults += [str(fault) for fault in mesh_faults(scene, comm)[1]]
     if faults:
         raise InputError(faults)
     if copies is not None:

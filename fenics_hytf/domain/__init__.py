@@ -3,7 +3,7 @@
 
 from fenics_hytf.domain.checks import jacobian_determinants, refuse_inverted_cells
 from fenics_hytf.domain.constraints import constraint_matrix
-from fenics_hytf.domain.domain import Domain, build
+from fenics_hytf.domain.domain import Domain, build, examine
 from fenics_hytf.domain.grids import MeshData
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "MeshData",
     "build",
     "constraint_matrix",
+    "examine",
     "jacobian_determinants",
     "refuse_inverted_cells",
 ]

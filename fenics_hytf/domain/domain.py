@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -19,7 +19,7 @@ from fenics_hytf import _compat
 from fenics_hytf.domain.checks import refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
-from fenics_hytf.scene import Fault, Scene, SceneError
+from fenics_hytf.scene import Fault, Scene, SceneError, Sections
 
 Scalar = TypeVar("Scalar", np.float64, np.int64)
 
@@ -104,27 +104,48 @@ def build(scene: Scene, comm: MPI.Comm) -> Domain:
             boundary that the scene names and the mesh lacks, a motion along an axis that it lacks,
             or a cell with a non-positive Jacobian.
     """
-    data = _on_rank_zero(comm, lambda: _mesh_data(scene))
-    mesh = _distribute(data, comm)
-    refuse_inverted_cells(mesh)
+    domain, faults = examine(scene, comm)
+    if domain is None or faults:
+        raise SceneError(faults)
+    return domain
+
+
+def examine(scene: Scene | Sections, comm: MPI.Comm) -> tuple[Domain | None, list[Fault]]:
+    """Make the mesh and space, and collect what is wrong with them instead of raising.
+
+    Args:
+        scene: The scene, or its valid sections; one with ``mesh`` at least.
+        comm: Communicator.
+
+    Returns:
+        The domain, or ``None`` where there is no mesh to compute on; and the faults, the same on
+        every rank.
+    """
+    try:
+        data, faults = _on_rank_zero(comm, lambda: _mesh_data(scene))
+        mesh = _distribute(data, comm)
+        refuse_inverted_cells(mesh)
+    except SceneError as error:
+        return None, error.faults
     mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    element = basix.ufl.element(
-        "Lagrange", mesh.basix_cell(), scene.mesh.degree, shape=(mesh.geometry.dim,)
-    )
+    degree = scene.mesh.degree if scene.mesh else 1
+    element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(mesh.geometry.dim,))
     header = (data.region_names, data.region) if data else None
     names, region = comm.bcast(header)
     local = region[np.asarray(mesh.topology.original_cell_index, np.int64)]
     boundaries = _boundaries(mesh, data, comm)
-    _require_facets(boundaries, ("base", *scene.boundary), comm)
-    return Domain(mesh, functionspace(mesh, element), names, local, boundaries)
+    faults += _bare_boundaries(boundaries, ("base", *(scene.boundary or {})), comm)
+    return Domain(mesh, functionspace(mesh, element), names, local, boundaries), faults
 
 
-def _on_rank_zero(comm: MPI.Comm, make: Callable[[], MeshData]) -> MeshData | None:
-    """Run on rank 0 only and raise its error on every rank."""
-    data, error = None, None
+def _on_rank_zero(
+    comm: MPI.Comm, make: Callable[[], tuple[MeshData, list[Fault]]]
+) -> tuple[MeshData | None, list[Fault]]:
+    """Run on rank 0 only; its error is raised, and its faults are known, on every rank."""
+    made, error = None, None
     if comm.rank == 0:
         try:
-            data = make()
+            made = make()
         except Exception as caught:  # whatever it is, the other ranks are waiting
             error = caught
     if isinstance(error, SceneError):
@@ -133,40 +154,44 @@ def _on_rank_zero(comm: MPI.Comm, make: Callable[[], MeshData]) -> MeshData | No
     if error is not None:
         comm.bcast(("error", f"{type(error).__name__}: {error}"))
         raise error
-    kind, content = comm.bcast(("", None))
+    kind, content = comm.bcast(("made", made[1]) if made else None)
     if kind == "faults":
         raise SceneError(content)
     if kind == "error":
         raise RuntimeError(f"the mesh could not be made on rank 0: {content}")
-    return data
+    return (made[0] if made else None), list(content)
 
 
-def _mesh_data(scene: Scene) -> MeshData:
+def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
+    mesh, soils = scene.mesh, tuple(scene.soil)
+    if mesh is None:
+        raise SceneError([])
+    if mesh.column is not None:
+        return column_mesh(mesh.column), []
+    if mesh.box is not None:
+        return box_mesh(mesh.box, mesh, soils), []
+    data = read_mesh(Path(mesh.file or ""), soils)
+    return data, list(_file_faults(scene, data))
+
+
+def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:
+    """What the scene says of a mesh file that the file does not hold."""
     soils = tuple(scene.soil)
-    if scene.mesh.column is not None:
-        return column_mesh(scene.mesh.column)
-    if scene.mesh.box is not None:
-        return box_mesh(scene.mesh.box, scene.mesh, soils)
-    data = read_mesh(Path(scene.mesh.file or ""), soils)
-    faults = []
     missing = [name for name in data.region_names if name not in soils]
     if missing:
-        faults.append(Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each"))
+        yield Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each")
     names = (*data.planes, *data.facets)
     known = ", ".join(names)
-    for name in scene.boundary:
+    for name in scene.boundary or {}:
         if name not in names:
-            faults.append(Fault(f"boundary.{name}", "no such boundary in the mesh", known))
+            yield Fault(f"boundary.{name}", "no such boundary in the mesh", known)
     gdim = data.points.shape[1]
-    if scene.mesh.kinematics and gdim == 3:
-        faults.append(Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh"))
+    if scene.mesh and scene.mesh.kinematics and gdim == 3:
+        yield Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh")
     for number, motion in enumerate(scene.motion):
-        if motion.direction not in "xyz"[:gdim]:
+        if motion is not None and motion.direction not in "xyz"[:gdim]:
             expected = f"{' or '.join('xyz'[:gdim])}: the mesh has {gdim} dimensions"
-            faults.append(Fault(f"motion[{number}].direction", f'"{motion.direction}"', expected))
-    if faults:
-        raise SceneError(faults)
-    return data
+            yield Fault(f"motion[{number}].direction", f'"{motion.direction}"', expected)
 
 
 def _distribute(data: MeshData | None, comm: MPI.Comm) -> Mesh:
@@ -204,13 +229,10 @@ def _boundaries(
     return found
 
 
-def _require_facets(
+def _bare_boundaries(
     boundaries: dict[str, npt.NDArray[np.int32]], names: tuple[str, ...], comm: MPI.Comm
-) -> None:
-    """Raise on every rank where a boundary that counts has no facet of the mesh."""
+) -> list[Fault]:
+    """Faults of boundaries that count and have no facet of the mesh (collective)."""
     bare = [n for n in boundaries if n in names and not comm.allreduce(len(boundaries[n]))]
-    if bare:
-        expected = "a boundary made of sides of the mesh's cells"
-        raise SceneError(
-            [Fault(f"boundary.{name}", "no side of a cell", expected) for name in bare]
-        )
+    expected = "a boundary made of sides of the mesh's cells"
+    return [Fault(f"boundary.{name}", "no side of a cell", expected) for name in bare]

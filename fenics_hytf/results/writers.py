@@ -8,6 +8,7 @@ exist (not finite) is an empty field. Rows are written in blocks; no file is eve
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -100,8 +101,9 @@ def _transfer(result: Result) -> tuple[list[str], Rows]:
                 header += [f"{name}.re", f"{name}.im"]
 
     def block(lapse: LapseResult) -> Rows:
-        values = lapse.transfer.reshape(-1, lapse.frequency.size)
-        parts = np.stack([values.real, values.imag], axis=1).reshape(-1, lapse.frequency.size)
+        num_lines = lapse.frequency.size
+        values = lapse.transfer.reshape(math.prod(lapse.transfer.shape[:-1]), num_lines)
+        parts = np.stack([values.real, values.imag], axis=1).reshape(2 * len(values), num_lines)
         return _rows([lapse.frequency, np.full(lapse.frequency.size, lapse.index), *parts])
 
     return header, (row for lapse in result.lapses for row in block(lapse))

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The outer loop over lapses, and what it leaves behind."""
 
+from fenics_hytf.simulation.check import mesh_faults
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.flow import seed_points, simulate
 from fenics_hytf.simulation.inspection import Inspection, inspect
@@ -23,6 +24,7 @@ __all__ = [
     "SnapshotCallback",
     "Work",
     "inspect",
+    "mesh_faults",
     "seed_points",
     "simulate",
 ]

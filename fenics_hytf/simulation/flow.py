@@ -13,7 +13,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fenics_hytf import _compat
-from fenics_hytf.domain import Domain, build
+from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import SweepError
 from fenics_hytf.lapse import (
     CellProbe,
@@ -40,6 +40,7 @@ from fenics_hytf.particles import (
     seed,
 )
 from fenics_hytf.scene import Fault, Scene, SceneError
+from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.receivers import Receivers
@@ -129,7 +130,7 @@ class _Run:
         """Mesh, points, receivers, and the operators that last for the whole run."""
         scene = self.scene
         with self.clock.phase("setup"):
-            self.domain = build(scene, self.comm)
+            self.domain = checked_domain(scene, self.comm)
             self.points = seed_points(scene, self.domain)
             self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
             self.equations = Equations(scene, self.domain, self._assemblies)
@@ -361,4 +362,5 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
     try:
         return seed(domain.mesh, domain.regions, density, count, fields)
     except ValueError as error:  # a number of points that the mesh file's cells have no rule for
-        raise SceneError([Fault("mesh.points_per_cell", str(count), str(error))]) from error
+        expected = str(error).rpartition("expected ")[2]
+        raise SceneError([Fault("mesh.points_per_cell", str(count), expected)]) from error

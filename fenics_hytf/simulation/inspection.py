@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
-from fenics_hytf.domain import build, constraint_matrix
+from fenics_hytf.domain import constraint_matrix
 from fenics_hytf.lapse import excite
 from fenics_hytf.scene import Scene
+from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.flow import seed_points
-from fenics_hytf.simulation.receivers import Receivers
 
 # Entries of an LDLᵀ factor a row, from nested dissection: 2D c n log2 n (measured 7.6 M entries on
 # 81 002 unknowns, so c = 5.8), 3D c n^(4/3) (PORD on 41 k unknowns, so c = 1).
@@ -63,9 +63,8 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     Raises:
         SceneError: A fault that only the mesh shows.
     """
-    domain = build(scene, comm)
+    domain = checked_domain(scene, comm)
     points = seed_points(scene, domain)
-    Receivers(domain, points, scene.output.receivers)
     axes = tuple(domain.components.index(m.direction) for m in scene.motion)
     T = constraint_matrix(domain, scene.boundary, axes)
     unknowns = int(T.getSize()[1])

@@ -8,9 +8,58 @@ import numpy.typing as npt
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.particles import Points, Sites, locate, resolve_owners
-from fenics_hytf.scene import Fault, Receiver, SceneError
+from fenics_hytf.scene import Fault, Receiver
 
 RealArray = npt.NDArray[np.float64]
+
+
+def find_places(
+    domain: Domain, places: RealArray
+) -> tuple[npt.NDArray[np.int32], RealArray, npt.NDArray[np.bool_]]:
+    """Find the cell of each place; the rank that owns it has it (collective).
+
+    Args:
+        domain: The domain.
+        places: The same on every rank [m], shape ``(n, gdim)``.
+
+    Returns:
+        Local cell where this rank owns it, else -1, shape ``(n,)``; reference coordinates, shape
+        ``(n, tdim)``; and whether the place is in the mesh, shape ``(n,)``.
+    """
+    cells, X = locate(domain.mesh, places)
+    found = cells >= 0
+    claims = np.full(len(cells), -1, np.int64)
+    claims[found] = domain.input_cells[cells[found]]
+    _, owner = resolve_owners(domain.comm, claims)
+    return np.where(owner == domain.comm.rank, cells, -1).astype(np.int32), X, owner >= 0
+
+
+def receiver_faults(domain: Domain, receivers: dict[str, Receiver]) -> list[Fault]:
+    """Receivers of another dimension, or outside the mesh (collective).
+
+    Args:
+        domain: The domain.
+        receivers: Receivers by name.
+
+    Returns:
+        The faults, the same on every rank.
+    """
+    gdim = domain.gdim
+    faults = [
+        Fault(f"output.receivers.{name}", f"{len(r.place)} coordinates", f"{gdim} of them")
+        for name, r in receivers.items()
+        if len(r.place) != gdim
+    ]
+    placed = {name: r.place for name, r in receivers.items() if len(r.place) == gdim}
+    *_, inside = find_places(domain, np.array(list(placed.values())).reshape(-1, gdim))
+    faults += [
+        Fault(
+            f"output.receivers.{name}", f"{list(place)} outside the mesh", "a place in the mesh [m]"
+        )
+        for (name, place), is_inside in zip(placed.items(), inside, strict=True)
+        if not is_inside
+    ]
+    return faults
 
 
 class Receivers:
@@ -21,49 +70,19 @@ class Receivers:
         points: The material points at the start.
         receivers: Receivers by name.
 
-    Raises:
-        SceneError: On every rank: receivers outside the mesh, or of another dimension.
+    All places are in the mesh: :func:`receiver_faults` has been asked.
     """
 
     def __init__(self, domain: Domain, points: Points, receivers: dict[str, Receiver]) -> None:
         self._domain = domain
         self.names = tuple(receivers)
-        self._require_dimension(receivers)
         self.places = np.array([r.place for r in receivers.values()]).reshape(-1, domain.gdim)
         rides = np.array([r.rides for r in receivers.values()], bool)
         self._riders = np.flatnonzero(rides)
         self._fixed = np.flatnonzero(~rides)
-        self._cells, self._X = self._find()
+        cells, X, _ = find_places(domain, self.places)
+        self._cells, self._X = cells[self._fixed], X[self._fixed]
         self._ids = np.array([self._nearest(points, self.places[r]) for r in self._riders], int)
-
-    def _require_dimension(self, receivers: dict[str, Receiver]) -> None:
-        faults = [
-            Fault(f"output.receivers.{name}", f"{len(r.place)} coordinates", f"{self._domain.gdim}")
-            for name, r in receivers.items()
-            if len(r.place) != self._domain.gdim
-        ]
-        if faults:
-            raise SceneError(faults)
-
-    def _find(self) -> tuple[npt.NDArray[np.int32], RealArray]:
-        """Cell of each fixed receiver where this rank owns it, else -1."""
-        domain = self._domain
-        cells, X = locate(domain.mesh, self.places[self._fixed])
-        found = cells >= 0
-        claims = np.full(len(cells), -1, np.int64)
-        claims[found] = domain.input_cells[cells[found]]
-        _, owner = resolve_owners(domain.comm, claims)
-        faults = [
-            Fault(
-                f"output.receivers.{self.names[self._fixed[lost]]}",
-                f"{self.places[self._fixed[lost]].tolist()} outside the mesh",
-                "a place in the mesh [m]",
-            )
-            for lost in np.flatnonzero(owner < 0)
-        ]
-        if faults:
-            raise SceneError(faults)
-        return np.where(owner == domain.comm.rank, cells, -1).astype(np.int32), X
 
     def _nearest(self, points: Points, place: RealArray) -> int:
         """Identity of the point nearest to a place; of equally near ones the lowest."""

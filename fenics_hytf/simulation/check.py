@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: MIT
+"""What is wrong with a scene that only its mesh shows; all of it at once."""
+
+from __future__ import annotations
+
+from mpi4py import MPI
+
+from fenics_hytf.domain import Domain, constraint_matrix, examine
+from fenics_hytf.scene import Fault, Scene, SceneError, Sections
+from fenics_hytf.simulation.receivers import receiver_faults
+
+
+def mesh_faults(
+    scene: Scene | Sections, comm: MPI.Comm = MPI.COMM_WORLD
+) -> tuple[Domain | None, list[Fault]]:
+    """Make the scene's domain and collect the faults that it shows (collective).
+
+    Args:
+        scene: The scene; or, of one with faults, the sections that are valid.
+        comm: Communicator.
+
+    Returns:
+        The domain, ``None`` where there is none to compute on; and the faults, the same on every
+        rank.
+    """
+    if scene.mesh is None:
+        return None, []
+    domain, faults = examine(scene, comm)
+    if domain is None:
+        return None, faults
+    if scene.output is not None:
+        faults += receiver_faults(domain, scene.output.receivers)
+    if scene.boundary is not None and not faults:
+        faults += _boundary_faults(scene, domain)
+    if scene.effects is not None and scene.effects.equivalent_linear is not None:
+        soils = [scene.soil.get(name) for name in domain.region_names]
+        if not faults and all(soil is not None and soil.curve is None for soil in soils):
+            expected = f"curves for one of the mesh's soils, {', '.join(domain.region_names)}"
+            faults.append(Fault("effects.equivalent_linear", "no soil with curves", expected))
+    return domain, faults
+
+
+def checked_domain(scene: Scene, comm: MPI.Comm) -> Domain:
+    """Make the scene's domain.
+
+    Args:
+        scene: The scene.
+        comm: Communicator.
+
+    Returns:
+        The domain.
+
+    Raises:
+        SceneError: With every fault that the mesh shows; on every rank.
+    """
+    domain, faults = mesh_faults(scene, comm)
+    if domain is None or faults:
+        raise SceneError(faults)
+    return domain
+
+
+def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
+    """What keeps the constraints from being built."""
+    motions = [m for m in scene.motion if m is not None and m.direction in domain.components]
+    axes = [domain.components.index(m.direction) for m in motions]
+    try:
+        constraint_matrix(domain, scene.boundary or {}, axes).destroy()
+    except SceneError as error:
+        return error.faults
+    return []

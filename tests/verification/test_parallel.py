@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: MIT
+"""Whole scenes on all ranks against the same scenes on one, in the same process.
+
+Ranks add in another order and MUMPS eliminates in another, so results differ by round-off, times
+the condition of the matrices and what the equivalent-linear loop makes of it: 1e-10 of the largest
+value of each quantity is asked for.
+"""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.meshes import SOIL, gmsh_block, gmsh_section, scene
+
+from fenics_hytf.lapse import EquivalentLinearError
+from fenics_hytf.scene import SceneError
+from fenics_hytf.simulation import SimulationError, simulate
+
+WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
+LIMIT = 1e-10
+
+pytestmark = [
+    pytest.mark.mpi,
+    pytest.mark.skipif(WORLD.size == 1, reason="compares several ranks with one"),
+]
+
+CURVES = {"model": "darendeli", "plasticity_index": 15, "mean_stress": 60e3, "ocr": 1}
+DAMPED = SOIL | {"damping": 0.04}
+SOFT = DAMPED | {"shear_wave_velocity": 120.0}
+HISTORIES = ("displacement", "velocity", "acceleration", "total_acceleration", "transfer")
+COUNTS = ("factorisations", "solves", "excited_lines", "assemblies", "inverse_mappings")
+
+
+def record(direction="x", pga=0.1, n=160):
+    """A short synthetic record of lines up to 6 Hz."""
+    shape = {"n": n, "dt": 0.02, "f1": 0.7, "f2": 6.0, "nf": 6, "t1": 0.4, "t2": 1.5, "c": 1.5}
+    return {"direction": direction, "synthetic": shape, "pga": pga}
+
+
+def worst_difference(mine, alone) -> float:
+    """Largest difference over the largest value, of everything that a lapse leaves behind."""
+    worst = 0.0
+
+    def compare(a, b):
+        nonlocal worst
+        a, b = np.asarray(a), np.asarray(b)
+        assert a.shape == b.shape
+        if a.dtype.kind in "iu":
+            assert np.array_equal(a, b)
+        elif a.size and np.abs(b).max() > 0:
+            worst = max(worst, float(np.abs(a - b).max() / np.abs(b).max()))
+        else:
+            assert not np.any(a)
+
+    assert len(mine.lapses) == len(alone.lapses)
+    for lapse, reference in zip(mine.lapses, alone.lapses, strict=True):
+        compare(lapse.frequency, reference.frequency)
+        for name in HISTORIES:
+            compare(getattr(lapse, name), getattr(reference, name))
+        for field in fields(lapse.cells):
+            compare(getattr(lapse.cells, field.name), getattr(reference.cells, field.name))
+        # The worst cell itself may be either of two that mirror each other.
+        compare(lapse.loop.change, reference.loop.change)
+        ledger, other = lapse.ledger.as_dict(), reference.ledger.as_dict()
+        del ledger["migrated"], other["migrated"]
+        assert ledger == other  # sums of masses are exact
+        assert lapse.worst_residual < 1e-10
+    return worst
+
+
+def agree(case, figure, name):
+    mine = simulate(case, WORLD)
+    alone = simulate(case, SELF)
+    for count in COUNTS:
+        assert getattr(mine.work, count) == getattr(alone.work, count), count
+    assert mine.sizes == alone.sizes
+    assert mine.num_ranks == WORLD.size
+    # Every rank has the whole result.
+    surface = mine.history("total_acceleration")
+    assert np.any(surface)
+    np.testing.assert_array_equal(surface, WORLD.bcast(surface))
+    figure(f"{WORLD.size} ranks against one, {name}", worst_difference(mine, alone), LIMIT)
+    return mine
+
+
+def test_column_with_the_equivalent_linear_loop(figure):
+    layers = [
+        {"thickness": 2.0, "soil": "fill", "cells": 1},
+        {"thickness": 10.0, "soil": "clay", "cells": 8},
+        {"thickness": 6.0, "soil": "rock", "cells": 2},
+    ]
+    case = scene(
+        {"column": {"width": 1.0, "layers": layers}, "degree": 2},
+        soil={"fill": SOFT | {"curves": CURVES}, "clay": SOFT | {"curves": CURVES}, "rock": DAMPED},
+        motion=[record(pga=0.25)],
+        boundary={"left": "tied", "right": "tied"},
+        effects={"equivalent_linear": {"tolerance": 1e-4}},
+        output={"receivers": {"top": [0.5, 18.0], "mid": [0.5, 9.0], "base": [0.5, 0.0]}},
+    )
+    result = agree(case, figure, "column, equivalent linear")
+    assert len(result.lapses[0].loop.change) > 3
+
+
+@pytest.mark.parametrize("cells", [1, 2, 3])
+def test_columns_of_as_many_cells_as_ranks_or_fewer(cells, figure):
+    layers = [{"thickness": 6.0, "soil": "clay", "cells": cells}]
+    case = scene(
+        {"column": {"width": 1.0, "layers": layers}},
+        soil={"clay": DAMPED},
+        motion=[record()],
+        boundary={"left": "tied", "right": "tied"},
+        output={"receivers": {"top": [0.5, 6.0], "rider": {"point": [0.5, 3.0]}}},
+    )
+    agree(case, figure, f"column of {cells} cells")
+
+
+@pytest.mark.parametrize(
+    ("cell", "degree"), [("quadrilateral", 1), ("triangle", 1), ("triangle", 2)]
+)
+def test_section_with_two_motions(cell, degree, figure):
+    regions = [
+        {"soil": "soft", "polygon": [[3, 2], [9, 2], [9, 6], [3, 6]]},
+        {"soil": "stiff", "below": 3.0},
+        {"soil": "clay"},
+    ]
+    case = scene(
+        {
+            "box": {"size": [12.0, 6.0], "cells": [12, 6], "cell": cell},
+            "regions": regions,
+            "degree": degree,
+        },
+        soil={"clay": DAMPED, "soft": SOFT, "stiff": DAMPED | {"shear_wave_velocity": 400.0}},
+        motion=[record("x"), record("y", 0.05)],
+        effects={"rayleigh": {"alpha": 0.1, "beta": 1e-3}},
+        solver={"complex_modulus": "shake91", "keep": "bulk"},
+        output={"receivers": {"top": [6.0, 6.0], "edge": [12.0, 3.0], "inner": [4.3, 2.1]}},
+    )
+    agree(case, figure, f"section, {cell} degree {degree}, x and y")
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_block_with_all_sides_tied(cell, figure):
+    case = scene(
+        {
+            "box": {"size": [3.0, 2.0, 4.0], "cells": [3, 2, 4], "cell": cell},
+            "regions": [{"soil": "clay", "below": 2.0}, {"soil": "soft"}],
+        },
+        soil={"clay": DAMPED, "soft": SOFT},
+        motion=[record("x"), record("z", 0.05)],
+        boundary={side: "tied" for side in ("left", "right", "front", "back")},
+        output={"receivers": {"top": [1.5, 1.0, 4.0], "node": [1.0, 1.0, 2.0]}},
+    )
+    agree(case, figure, f"block of {cell} cells")
+
+
+def test_block_with_the_loop(figure):
+    case = scene(
+        {"box": {"size": [3.0, 3.0, 4.0], "cells": [3, 3, 4]}},
+        soil={"clay": SOFT | {"curves": CURVES}},
+        motion=[record("y", 0.4)],
+        effects={"equivalent_linear": True},
+        output={"receivers": {"top": [1.5, 1.5, 4.0]}},
+    )
+    agree(case, figure, "block, equivalent linear")
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_mesh_file(order, shared_path, figure):
+    file = shared_path / "section.msh"
+    if WORLD.rank == 0:
+        gmsh_section(file, order=order, quads=order == 2)
+    WORLD.Barrier()
+    case = scene(
+        {"file": str(file), "degree": order},
+        soil={"clay": DAMPED, "sand": SOFT},
+        motion=[record("x"), record("y")],
+        boundary={"left": "roller"},
+        output={"receivers": {"top": [2.0, 2.0], "point": {"point": [1.0, 0.6]}}},
+    )
+    agree(case, figure, f"gmsh section of order {order}")
+
+
+def test_mesh_file_in_space(shared_path, figure):
+    file = shared_path / "block.msh"
+    if WORLD.rank == 0:
+        gmsh_block(file)
+    WORLD.Barrier()
+    case = scene(
+        {"file": str(file)},
+        soil={"sand": DAMPED},
+        motion=[record("y")],
+        output={"receivers": {"top": [1.0, 0.5, 1.0]}},
+    )
+    agree(case, figure, "gmsh block")
+
+
+def test_lapses_with_convection(figure):
+    """Every effect of this version at once, over four lapses."""
+    case = scene(
+        {
+            "box": {"size": [8.0, 4.0], "cells": [8, 4]},
+            "regions": [{"soil": "clay", "below": 2.0}, {"soil": "soft"}],
+        },
+        soil={"clay": DAMPED | {"curves": CURVES}, "soft": SOFT | {"curves": CURVES}},
+        motion=[record("x", 0.2), record("y", 0.05)],
+        boundary={"left": "tied", "right": "tied"},
+        lapses={"count": 4},
+        effects={
+            "equivalent_linear": True,
+            "rayleigh": {"alpha": 0.05, "beta": 1e-3},
+            "geometric_stiffness": True,
+            "convection": True,
+        },
+        output={"receivers": {"top": [4.0, 4.0], "rider": {"point": [3.0, 2.5]}}},
+    )
+    result = agree(case, figure, "four lapses, every effect")
+    assert len(result.lapses) == 4
+
+
+def test_a_snapshot_of_the_fields_does_not_depend_on_the_ranks(figure):
+    case = scene(
+        {"box": {"size": [6.0, 4.0], "cells": [6, 4], "cell": "triangle"}, "degree": 2},
+        soil={"clay": DAMPED},
+        motion=[record()],
+        output={"receivers": {"top": [3.0, 4.0]}, "fields": True},
+    )
+    taken = {}
+    simulate(case, WORLD, snapshot=lambda s: taken.setdefault("mine", s))
+    simulate(case, SELF, snapshot=lambda s: taken.setdefault("alone", s))
+    mine, alone = taken["mine"], taken["alone"]
+    worst = 0.0
+    if WORLD.rank == 0:
+        np.testing.assert_array_equal(mine.cells, alone.cells)
+        pairs = [(mine.vertices, alone.vertices)]
+        for name in ("points", "vertex_fields", "cell_fields"):
+            found, expected = getattr(mine, name), getattr(alone, name)
+            assert set(found) == set(expected)
+            pairs += [(found[key], expected[key]) for key in expected]
+        for a, b in pairs:
+            largest = float(np.abs(b).max())
+            worst = max(worst, float(np.abs(a - b).max()) / (largest or 1.0))
+    else:
+        assert mine.points is None
+    figure(f"{WORLD.size} ranks against one, snapshot", worst, LIMIT)
+
+
+# ---------------------------------------------------------------- every rank stops alike
+
+
+def test_a_receiver_outside_stops_every_rank():
+    case = scene(
+        {"box": {"size": [2.0, 2.0], "cells": [2, 2]}, "regions": [{"soil": "clay"}]},
+        soil={"clay": DAMPED},
+        output={"receivers": {"in": [1.0, 1.0]}},
+    )
+    case.output.receivers["in"] = case.output.receivers["in"].model_copy(
+        update={"place": (9.0, 1.0)}
+    )
+    with pytest.raises(SceneError, match=r"output.receivers.in: found \[9.0, 1.0\] outside"):
+        simulate(case, WORLD)
+
+
+def test_a_loop_that_does_not_converge_stops_every_rank():
+    layers = [{"thickness": 8.0, "soil": "clay", "cells": 6}]
+    case = scene(
+        {"column": {"width": 1.0, "layers": layers}},
+        soil={"clay": SOFT | {"curves": CURVES}},
+        motion=[record(pga=0.5)],
+        boundary={"left": "tied", "right": "tied"},
+        lapses={"count": 2},
+        effects={"equivalent_linear": {"max_iterations": 2, "tolerance": 1e-6}},
+        output={"receivers": {"top": [0.5, 8.0]}},
+    )
+    with pytest.raises(SimulationError, match="lapse 0: equivalent-linear loop") as caught:
+        simulate(case, WORLD)
+    assert isinstance(caught.value.__cause__, EquivalentLinearError)
+    assert caught.value.partial is None
+    texts = WORLD.allgather(str(caught.value))
+    assert len(set(texts)) == 1
