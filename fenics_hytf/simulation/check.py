@@ -28,6 +28,10 @@ def mesh_faults(
     domain, faults = examine(scene, comm)
     if domain is None:
         return None, faults
+    try:
+        scene.mesh.points_in(domain.mesh.topology.cell_name())
+    except SceneError as error:
+        faults += error.faults
     if scene.output is not None:
         faults += receiver_faults(domain, scene.output.receivers)
     if scene.boundary is not None and not faults:

@@ -36,10 +36,9 @@ from fenics_hytf.particles import (
     Points,
     PointsNotFinite,
     PointsOutside,
-    default_points_per_cell,
     seed,
 )
-from fenics_hytf.scene import Fault, Scene, SceneError
+from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.errors import SimulationError
@@ -358,9 +357,5 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
         fields += ["stress"]
     density = [scene.soil[name].density for name in domain.region_names]
     cell_type = domain.mesh.topology.cell_name()
-    count = scene.mesh.points_per_cell or default_points_per_cell(cell_type, scene.mesh.degree)
-    try:
-        return seed(domain.mesh, domain.regions, density, count, fields)
-    except ValueError as error:  # a number of points that the mesh file's cells have no rule for
-        expected = str(error).rpartition("expected ")[2]
-        raise SceneError([Fault("mesh.points_per_cell", str(count), expected)]) from error
+    count = scene.mesh.points_in(cell_type)
+    return seed(domain.mesh, domain.regions, density, count, fields)

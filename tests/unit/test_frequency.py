@@ -367,6 +367,17 @@ def test_a_resonance_of_a_chain(size, omega):
     assert contour.residuals.max() < 1e-9
 
 
+def test_a_resonance_missed_by_round_off_is_refused(package):
+    # Small systems have small residuals even there: what counts is how much the load is amplified.
+    system = two_masses([[2, -1], [-1, 2]])
+    for omega in (np.sqrt(3.0), 1.0 + 1e-12, np.sqrt(3.0) * (1 - 1e-13)):
+        with pytest.raises(SweepError, match="resonance"):
+            direct_sweep(system, vector([1.0, 0.0]), [1j * omega])
+    # At a relative distance δ the amplification is 1/(4 δ): true, and no error.
+    near = direct_sweep(system, vector([1.0, 1.0]), [1j * (1 + 1e-6)])
+    np.testing.assert_allclose(near.solution(0)[:, 0], 1 / (1 - (1 + 1e-6) ** 2), rtol=1e-9)
+
+
 def test_a_body_without_support_is_refused_at_rest(package):
     system = two_masses([[1, -1], [-1, 1]])
     with pytest.raises(SweepError, match="at 0 Hz"):

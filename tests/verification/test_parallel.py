@@ -32,9 +32,9 @@ HISTORIES = ("displacement", "velocity", "acceleration", "total_acceleration", "
 COUNTS = ("factorisations", "solves", "excited_lines", "assemblies", "inverse_mappings")
 
 
-def record(direction="x", pga=0.1, n=160):
+def record(direction="x", pga=0.1, n=80):
     """A short synthetic record of lines up to 6 Hz."""
-    shape = {"n": n, "dt": 0.02, "f1": 0.7, "f2": 6.0, "nf": 6, "t1": 0.4, "t2": 1.5, "c": 1.5}
+    shape = {"n": n, "dt": 0.04, "f1": 0.7, "f2": 6.0, "nf": 6, "t1": 0.4, "t2": 1.5, "c": 1.5}
     return {"direction": direction, "synthetic": shape, "pga": pga}
 
 
