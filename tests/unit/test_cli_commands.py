@@ -228,7 +228,7 @@ def test_check_says_ok_and_what_it_takes(here, hytf):
     assert out.startswith("ok\n")
     assert words["cells"] == "4" and words["points"] == "16" and words["unknowns"] == "8"
     assert words["lapses"] == "1 of 32 samples"
-    assert words["excited"].split() == ["lines", "1"]
+    assert words["lines"].split() == ["to", "solve", "1"]
     assert "memory" in words and words["effects"] == "none"
     assert [p.name for p in here.iterdir()] == ["s.toml"]
 
@@ -363,3 +363,44 @@ def test_a_write_that_fails_on_one_rank_stops_all(shared, hytf, monkeypatch):
     shared.Barrier()
     assert not os.path.exists("s-result")
     shared.Barrier()
+
+
+def test_faults_of_scene_mesh_and_receivers_are_told_at_once(here, hytf):
+    import meshio
+
+    places = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
+    mesh = meshio.Mesh(places, [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1]])])
+    mesh.cell_data = {
+        "gmsh:physical": [[1], [2]],
+        "gmsh:geometrical": [[1], [2]],
+    }
+    mesh.field_data = {"clay": [1, 2], "base": [2, 1]}
+    meshio.write("box.msh", mesh, file_format="gmsh22", binary=False)
+    text = SCENE.replace(
+        'column = { width = 1.0, layers = [ { thickness = 8.0, soil = "sand", cells = 4 } ] }',
+        'file = "box.msh"\npoints_per_cell = 8',
+    )
+    text = text.replace("poisson = 0.3", "poisson = 0.7").replace("left =", "nosuch =")
+    text = text.replace("[0.5, 8.0]", "[0.5, 8.0], rider = { point = [9, 9] }")
+    Path("s.toml").write_text(text)
+    before = files(here)
+    code, out, err = hytf("run", "s.toml")
+    assert (code, out) == (2, "")
+    keys = {line.split(": ")[1] for line in err.splitlines()}
+    assert {"soil.sand.poisson"} <= keys
+    assert files(here) == before
+    text = text.replace("poisson = 0.7", "poisson = 0.3").replace('right = "tied"', "")
+    Path("s.toml").write_text(text.replace('nosuch = "tied"', 'nosuch = "free"'))
+    code, out, err = hytf("run", "s.toml")
+    keys = {line.split(": ")[1] for line in err.splitlines()}
+    expected = {"mesh.file", "mesh.points_per_cell", "boundary.nosuch"}
+    assert expected | {"output.receivers.top", "output.receivers.rider"} <= keys
+    assert code == 2 and files(here) == before
+
+
+def test_a_motion_of_nothing_gives_a_result(here, hytf):
+    Path("s.toml").write_text(SCENE.replace("amplitude = 1.0", "amplitude = 0.0"))
+    code, _, err = hytf("run", "s.toml", "--quiet")
+    assert (code, err) == (0, "")
+    assert json.loads(Path("s-result/summary.json").read_text())["work"]["factorisations"] == 0
+    assert len(Path("s-result/transfer.csv").read_text().splitlines()) == 1
