@@ -6,16 +6,20 @@ from pathlib import Path
 import pytest
 from _pytest.terminal import TerminalReporter
 
-_figures: list[tuple[str, float, float, str]] = []
+_figures: list[tuple[str, float, str, float, str]] = []
 
 
 @pytest.fixture
-def figure() -> Callable[[str, float, float, str], None]:
+def figure() -> Callable[..., None]:
     """Record a figure beside its limit, and require it: figure(name, measured, limit, unit)."""
 
-    def require(name: str, measured: float, limit: float, unit: str = "") -> None:
-        _figures.append((name, measured, limit, unit))
-        assert measured <= limit, f"{name}: measured {measured:.4g}, at most {limit:.4g} {unit}"
+    def require(
+        name: str, measured: float, limit: float, unit: str = "", at_least: bool = False
+    ) -> None:
+        sign = ">=" if at_least else "<="
+        _figures.append((name, measured, sign, limit, unit))
+        good = measured >= limit if at_least else measured <= limit
+        assert good, f"{name}: measured {measured:.4g}, wanted {sign} {limit:.4g} {unit}"
 
     return require
 
@@ -36,5 +40,6 @@ def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:
         return
     terminalreporter.section("measured against limit")
     width = max(len(name) for name, *_ in _figures)
-    for name, measured, limit, unit in _figures:
-        terminalreporter.write_line(f"{name:<{width}}  {measured:12.4g}  <= {limit:<8.4g} {unit}")
+    for name, measured, sign, limit, unit in _figures:
+        line = f"{name:<{width}}  {measured:12.4g}  {sign} {limit:<8.4g} {unit}"
+        terminalreporter.write_line(line.rstrip())

@@ -118,7 +118,7 @@ def shear(x: np.ndarray, step: int) -> np.ndarray:
 @pytest.mark.mpi
 @pytest.mark.parametrize("cell", CELLS)
 @pytest.mark.parametrize("field", [translation, rotation, shear])
-def test_prescribed_motion_over_cells_and_ranks(cell, field):
+def test_prescribed_motion_over_cells_and_ranks(cell, field, figure):
     size = default_points_per_cell(cell, 1)
     everyone, alone = planar_mesh(cell, WORLD), planar_mesh(cell, SELF)
     gdim = alone.geometry.dim
@@ -132,7 +132,7 @@ def test_prescribed_motion_over_cells_and_ranks(cell, field):
     momentum = WORLD.allreduce(points.mass @ points["velocity"])
     start = gathered(WORLD, everyone, points)
     V = fem.functionspace(everyone, ("Lagrange", 1, (gdim,)))
-    crossings = 0
+    crossings, change = 0, 0.0
     for step in range(6):
         report = move(everyone, points, field(points.x, step))
         again = move(alone, reference, field(reference.x, step))
@@ -144,8 +144,8 @@ def test_prescribed_motion_over_cells_and_ranks(cell, field):
         here = WORLD.allreduce(points.mass @ points["velocity"])
         weight = points.mass[:, None] * points["velocity"]
         nodes = WORLD.allreduce((transfer_matrix(points, V).T @ weight).sum(axis=0))
-        assert here == pytest.approx(momentum, rel=1e-13)
-        assert nodes == pytest.approx(momentum, rel=1e-13)
+        change = max(change, *(np.abs(p / momentum - 1).max() for p in (here, nodes)))
+    figure(f"momentum after six steps of {field.__name__}, {cell}", change, 1e-13)
     now, expected = gathered(WORLD, everyone, points), gathered(SELF, alone, reference)
     assert np.array_equal(now["label"], np.column_stack([now["id"], now["mass"]]))
     for name, values in expected.items():  # the same sets as on a single rank, to the last bit
