@@ -1,5 +1,7 @@
-"""Figures that the tests measure, printed as one table at the end of the run."""
+"""Figures that the tests measure, printed as one table at the end; one rank that reports."""
 
+import io
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,6 +9,25 @@ import pytest
 from _pytest.terminal import TerminalReporter
 
 _figures: list[tuple[str, float, str, float, str]] = []
+
+
+_other_ranks = io.StringIO()
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Let the first rank report; the others keep what they would say until it is needed."""
+    from mpi4py import MPI
+
+    reporter = config.pluginmanager.get_plugin("terminalreporter")
+    if MPI.COMM_WORLD.rank and reporter is not None:
+        reporter._tw._file = _other_ranks
+
+
+def pytest_unconfigure() -> None:
+    said = _other_ranks.getvalue()
+    if " failed" in said or " error" in said:
+        sys.stderr.write(said)
 
 
 @pytest.fixture

@@ -3,10 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import basix
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
+from scipy import sparse
 
 from fenics_hytf import _compat
 from fenics_hytf.domain.grids import MeshData
@@ -52,6 +55,28 @@ def _equal_rows(rows: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.int64
     order = np.lexsort(rows.T)
     starts = np.flatnonzero((rows[order[count - 1 :]] == rows[order[: 1 - count]]).all(axis=1))
     return np.sort(order[starts[0] : starts[0] + count]) if len(starts) else order[:0]
+
+
+def loose_cells(data: MeshData, held: Sequence[str]) -> npt.NDArray[np.intp]:
+    """Cells in parts of the mesh that no chain of shared nodes joins to a boundary.
+
+    Args:
+        data: The mesh.
+        held: Names of the boundaries.
+
+    Returns:
+        Their input numbers, sorted.
+    """
+    num_nodes, width = len(data.points), data.cells.shape[1]
+    ends = np.repeat(data.cells[:, 0], width - 1), data.cells[:, 1:].ravel()
+    links = sparse.coo_array((np.ones(len(ends[0]), bool), ends), shape=(num_nodes, num_nodes))
+    _, part = sparse.csgraph.connected_components(links, directed=False)
+    nodes = [data.facets[name].ravel() for name in held if name in data.facets]
+    for axis, place in (data.planes[name] for name in held if name in data.planes):
+        near = np.abs(data.points[:, axis] - place) <= 1e-12 * np.abs(data.points).max()
+        nodes.append(np.flatnonzero(near))
+    joined = part[np.concatenate(nodes)] if nodes else part[:0]
+    return np.flatnonzero(~np.isin(part[data.cells[:, 0]], joined))
 
 
 def jacobian_determinants(mesh: Mesh, X: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

@@ -16,10 +16,10 @@ from dolfinx.mesh import Mesh, create_mesh, locate_entities_boundary
 from mpi4py import MPI
 
 from fenics_hytf import _compat
-from fenics_hytf.domain.checks import refuse_inverted_cells
+from fenics_hytf.domain.checks import loose_cells, refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
-from fenics_hytf.scene import Fault, Scene, SceneError, Sections
+from fenics_hytf.scene import Fault, Scene, SceneError, default_kind, Sections
 
 Scalar = TypeVar("Scalar", np.float64, np.int64)
 
@@ -102,7 +102,7 @@ def build(scene: Scene, comm: MPI.Comm) -> Domain:
     Raises:
         SceneError: On every rank: an unreadable file, a region without a soil of its name, a
             boundary that the scene names and the mesh lacks, a motion along an axis that it lacks,
-            or a cell with a non-positive Jacobian.
+            a part that hangs on nothing, or a cell with a non-positive Jacobian.
     """
     domain, faults = examine(scene, comm)
     if domain is None or faults:

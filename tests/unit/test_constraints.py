@@ -24,6 +24,13 @@ def box(size, cells, cell, degree=1, boundary=None, comm=WORLD):
     return build(scene(mesh, ("clay",), boundary=boundary or {}), comm)
 
 
+def on_rank_zero(write, path):
+    if WORLD.rank == 0:
+        write(path)
+    WORLD.Barrier()
+    return {"file": str(path)}
+
+
 def constrained(domain, boundary) -> tuple[np.ndarray, np.ndarray]:
     """Places of all nodes, and T with rows in their order.
 
@@ -180,14 +187,25 @@ def test_edges_shared_by_two_tied_pairs_are_one_family():
     assert T[corners[0]].sum() == 3
 
 
+@pytest.mark.parametrize("pinned", [4, 2], ids=["left", "right"])
+def test_a_node_tied_to_a_held_one_is_held(pinned, shared_path):
+    # The lower half of one side only is fixed: its partners on the other side are as well.
+    groups = {
+        "clay": (2, [1]),
+        "sand": (2, [2]),
+        "base": (1, [1]),
+        "left": (1, [4, 7]),
+        "right": (1, [2, 5]),
+        "pin": (1, [pinned]),
+    }
+    mesh = on_rank_zero(lambda path: gmsh_section(path, groups=groups), shared_path / "a.msh")
+    x, T = constrained(build(scene(mesh), WORLD), {**TIED, "pin": "fixed"})
+    sides = np.isclose(x[:, 0], 0.0) | np.isclose(x[:, 0], 4.0)
+    held = (sides & (x[:, 1] <= 1.0)) | (x[:, 1] == 0.0)
+    np.testing.assert_array_equal(T.any(axis=2), np.tile(~held[:, None], 2))
+
+
 # ---------------------------------------------------------------- what cannot be constrained
-
-
-def on_rank_zero(write, path):
-    if WORLD.rank == 0:
-        write(path)
-    WORLD.Barrier()
-    return {"file": str(path)}
 
 
 def refused(domain, boundary, shaken=()) -> dict[str, str]:

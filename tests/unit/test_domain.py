@@ -438,6 +438,30 @@ def test_a_file_without_base(tmp_path):
     assert set(held.boundaries) == {"left"}
 
 
+def test_a_part_that_shares_no_node_is_refused(tmp_path):
+    # Two rectangles drawn one on the other without being joined: the upper one would float.
+    file = tmp_path / "a.msh"
+    with gmsh_model(file) as gmsh:
+        occ = gmsh.model.occ
+        lower, upper = occ.addRectangle(0, 0, 0, 2, 1), occ.addRectangle(0, 1, 0, 2, 1)
+        occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [lower], name="clay")
+        gmsh.model.addPhysicalGroup(2, [upper], name="sand")
+        gmsh.model.addPhysicalGroup(1, [1], name="base")
+        gmsh.model.addPhysicalGroup(1, [7], name="top")
+    found = faults({"file": str(file)}, ("clay", "sand"))["mesh.file"]
+    assert "that hang together with nothing held" in found
+    mesh = meshio.read(file)
+    lower = sum(len(b.data) for b in mesh.cells if b.type == "triangle" and _flat_below(mesh, b))
+    assert f"the first {lower}," in found
+    # Two parts, each of them held, are two parts.
+    build(scene({"file": str(file)}, boundary={"top": "fixed"}), SELF)
+
+
+def _flat_below(mesh, block) -> bool:
+    return bool(mesh.points[block.data.ravel(), 1].max() <= 1.0)
+
+
 def test_an_uneven_floor_needs_a_name(tmp_path):
     uneven = PLACES.copy()
     uneven[2, 1] = 0.25
