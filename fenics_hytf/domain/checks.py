@@ -71,12 +71,15 @@ def loose_cells(data: MeshData, held: Sequence[str]) -> npt.NDArray[np.intp]:
     ends = np.repeat(data.cells[:, 0], width - 1), data.cells[:, 1:].ravel()
     links = sparse.coo_array((np.ones(len(ends[0]), bool), ends), shape=(num_nodes, num_nodes))
     _, part = sparse.csgraph.connected_components(links, directed=False)
-    nodes = [data.facets[name].ravel() for name in held if name in data.facets]
-    for axis, place in (data.planes[name] for name in held if name in data.planes):
-        near = np.abs(data.points[:, axis] - place) <= 1e-12 * np.abs(data.points).max()
-        nodes.append(np.flatnonzero(near))
-    joined = part[np.concatenate(nodes)] if nodes else part[:0]
-    return np.flatnonzero(~np.isin(part[data.cells[:, 0]], joined))
+    joined = np.zeros(num_nodes, bool)
+    for name in held:
+        if name in data.facets:
+            joined[data.facets[name].ravel()] = True
+        else:
+            axis, place = data.planes[name]
+            off = np.abs(data.points[:, axis] - place)
+            joined |= off <= 1e-12 * np.abs(data.points).max()
+    return np.flatnonzero(~np.isin(part[data.cells[:, 0]], part[joined]))
 
 
 def jacobian_determinants(mesh: Mesh, X: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

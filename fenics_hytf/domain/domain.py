@@ -19,7 +19,7 @@ from fenics_hytf import _compat
 from fenics_hytf.domain.checks import loose_cells, refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
-from fenics_hytf.scene import Fault, Scene, SceneError, default_kind, Sections
+from fenics_hytf.scene import Fault, Scene, SceneError, Sections, default_kind
 
 Scalar = TypeVar("Scalar", np.float64, np.int64)
 
@@ -182,9 +182,16 @@ def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:
         yield Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each")
     names = (*data.planes, *data.facets)
     known = ", ".join(names)
-    for name in scene.boundary or {}:
+    kinds = scene.boundary or {}
+    for name in kinds:
         if name not in names:
             yield Fault(f"boundary.{name}", "no such boundary in the mesh", known)
+    held = [name for name in names if kinds.get(name, default_kind(name)) != "free"]
+    loose = loose_cells(data, held)
+    if held and len(loose):
+        found = f"{len(loose)} cells, the first {loose[0]}, that hang together with nothing held"
+        expected = "parts that share nodes: join them in the mesh generator (gmsh: fragment)"
+        yield Fault("mesh.file", found, expected)
     gdim = data.points.shape[1]
     if scene.mesh and scene.mesh.kinematics and gdim == 3:
         yield Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh")
