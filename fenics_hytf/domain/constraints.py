@@ -30,9 +30,10 @@ def constraint_matrix(
     Args:
         domain: The domain.
         boundary: Kind of each boundary: ``rigid`` and ``fixed`` hold every component, ``roller``
-            the normal one, ``tied`` sides move alike; ``free`` and unnamed ones are free, except
+            the normal one, ``tied`` sides move alike; others and unnamed ones are free, except
             that ``base`` is rigid unless it is named.
-        shaken: Components in which the base moves; something must be held in each.
+        shaken: Components in which the base moves; something must be held in each, or stand on a
+            compliant base.
 
     Returns:
         Matrix of zeros and ones, rows distributed as the displacement space, columns the unknowns
@@ -45,14 +46,15 @@ def constraint_matrix(
     kinds = {name: default_kind(name) for name in domain.boundaries} | dict(boundary)
     V = domain.V
     size = V.dofmap.index_map.size_local
-    held = np.zeros((size + V.dofmap.index_map.num_ghosts, domain.gdim), bool)
+    held = np.zeros((size + V.dofmap.index_map.num_ghosts, domain.num_components), bool)
     for name, kind in kinds.items():
         if kind in ("rigid", "fixed"):
-            held[_nodes(domain, name)] = True
-        elif kind == "roller":
-            held[_nodes(domain, name), _normal_axis(domain, name)] = True
+            held[boundary_nodes(domain, name)] = True
+        elif kind == "roller" and domain.num_components > 1:  # across the plane a roller is free
+            held[boundary_nodes(domain, name), normal_axis(domain, name)] = True
     held = held[:size]
-    _require_base(domain, held, shaken)
+    if "compliant" not in kinds.values():
+        _require_base(domain, held, shaken)
     image = _tied_nodes(domain, kinds)
     _share_holds(domain, held, image)
     return _assemble(V, held, image)
@@ -68,20 +70,31 @@ def _require_base(domain: Domain, held: npt.NDArray[np.bool_], shaken: Sequence[
         raise SceneError([Fault("boundary", what, expected)])
 
 
-def _nodes(domain: Domain, name: str) -> npt.NDArray[np.int32]:
-    """Local nodes (owned and ghost) of a boundary."""
+def boundary_nodes(domain: Domain, name: str) -> npt.NDArray[np.int32]:
+    """Local nodes of a boundary, owned ones and ghosts, shape ``(n,)``."""
     facets = domain.boundaries.get(name, np.empty(0, np.int32))
     return locate_dofs_topological(domain.V, domain.mesh.topology.dim - 1, facets)
 
 
-def _normal_axis(domain: Domain, name: str) -> int:
-    """Axis normal to a plane boundary."""
-    places = domain.V.tabulate_dof_coordinates()[_nodes(domain, name), : domain.gdim]
+def normal_axis(domain: Domain, name: str) -> int:
+    """Axis normal to a plane boundary (collective).
+
+    Args:
+        domain: The domain.
+        name: Name of the boundary.
+
+    Returns:
+        Number of the axis.
+
+    Raises:
+        SceneError: The boundary is not parallel to an axis.
+    """
+    places = domain.V.tabulate_dof_coordinates()[boundary_nodes(domain, name), : domain.gdim]
     everyone = np.concatenate(domain.comm.allgather(places))
     extent = np.ptp(everyone, axis=0)
     axis = int(np.argmin(extent))
     if extent[axis] > 1e-9 * extent.max():
-        expected = "a vertical or horizontal side under a roller, or 'fixed', or 'free'"
+        expected = "a plane side, vertical or level, for this kind of boundary"
         raise SceneError(
             [Fault(f"boundary.{name}", "a side that is not parallel to an axis", expected)]
         )
@@ -98,7 +111,7 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
             continue
         sides = []
         for name in (low, high):
-            nodes = _nodes(domain, name)
+            nodes = boundary_nodes(domain, name)
             nodes = nodes[nodes < size]
             numbers = V.dofmap.index_map.local_to_global(nodes)
             places = V.tabulate_dof_coordinates()[nodes, :gdim]

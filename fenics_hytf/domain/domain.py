@@ -19,7 +19,15 @@ from fenics_hytf import _compat
 from fenics_hytf.domain.checks import loose_cells, refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
-from fenics_hytf.scene import Fault, Scene, SceneError, Sections, default_kind
+from fenics_hytf.scene import (
+    Fault,
+    Scene,
+    SceneError,
+    Sections,
+    components_of,
+    default_kind,
+    direction_fault,
+)
 
 Scalar = TypeVar("Scalar", np.float64, np.int64)
 
@@ -53,9 +61,14 @@ class Domain:
         return self.mesh.geometry.dim
 
     @property
+    def num_components(self) -> int:
+        """Displacement components of a node: one where the section moves across its plane."""
+        return int(self.V.dofmap.index_map_bs)
+
+    @property
     def components(self) -> tuple[str, ...]:
         """Names of the displacement components."""
-        return ("x", "y", "z")[: self.gdim]
+        return components_of(self.gdim, "antiplane" if self.num_components == 1 else None)
 
     @property
     def num_owned_cells(self) -> int:
@@ -87,6 +100,15 @@ class Domain:
         for cells, part in parts:
             everything[cells] = part
         return everything
+
+    def centroids(self) -> npt.NDArray[np.float64]:
+        """Mean of the geometry nodes of every cell, in the order of the input (collective).
+
+        Returns:
+            [m], shape ``(num_cells, gdim)``.
+        """
+        nodes = _compat.geometry_dofmap(self.mesh)[: self.num_owned_cells]
+        return self.gather_cells(self.mesh.geometry.x[nodes].mean(axis=1)[:, : self.gdim])
 
 
 def build(scene: Scene, comm: MPI.Comm) -> Domain:
@@ -123,19 +145,39 @@ def examine(scene: Scene | Sections, comm: MPI.Comm) -> tuple[Domain | None, lis
     """
     try:
         data, faults = _on_rank_zero(comm, lambda: _mesh_data(scene))
-        mesh = _distribute(data, comm)
-        refuse_inverted_cells(mesh)
+        degree, kinematics = (scene.mesh.degree, scene.mesh.kinematics) if scene.mesh else (1, None)
+        gdim = comm.bcast(data.points.shape[1] if data else None)
+        domain = make_domain(data, comm, degree, len(components_of(gdim, kinematics)))
     except SceneError as error:
         return None, error.faults
+    kinds = scene.boundary.kinds if scene.boundary else {}
+    faults += _bare_boundaries(domain.boundaries, ("base", *kinds), comm)
+    return domain, faults
+
+
+def make_domain(data: MeshData | None, comm: MPI.Comm, degree: int, num_components: int) -> Domain:
+    """Distribute a mesh and make its displacement space (collective).
+
+    Args:
+        data: The mesh on rank 0, ``None`` elsewhere.
+        comm: Communicator.
+        degree: Degree of the displacement.
+        num_components: Displacement components of a node.
+
+    Returns:
+        The domain.
+
+    Raises:
+        SceneError: A cell with a non-positive Jacobian; on every rank.
+    """
+    mesh = _distribute(data, comm)
+    refuse_inverted_cells(mesh)
     mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    degree = scene.mesh.degree if scene.mesh else 1
-    element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=(mesh.geometry.dim,))
-    header = (data.region_names, data.region) if data else None
-    names, region = comm.bcast(header)
+    names, region = comm.bcast((data.region_names, data.region) if data else None)
     local = region[np.asarray(mesh.topology.original_cell_index, np.int64)]
-    boundaries = _boundaries(mesh, data, comm)
-    faults += _bare_boundaries(boundaries, ("base", *(scene.boundary or {})), comm)
-    return Domain(mesh, functionspace(mesh, element), names, local, boundaries), faults
+    shape = (num_components,) if num_components > 1 else None
+    element = basix.ufl.element("Lagrange", mesh.basix_cell(), degree, shape=shape)
+    return Domain(mesh, functionspace(mesh, element), names, local, _boundaries(mesh, data, comm))
 
 
 def _on_rank_zero(
@@ -182,7 +224,7 @@ def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:
         yield Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each")
     names = (*data.planes, *data.facets)
     known = ", ".join(names)
-    kinds = scene.boundary or {}
+    kinds = scene.boundary.kinds if scene.boundary else {}
     for name in kinds:
         if name not in names:
             yield Fault(f"boundary.{name}", "no such boundary in the mesh", known)
@@ -195,10 +237,10 @@ def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:
     gdim = data.points.shape[1]
     if scene.mesh and scene.mesh.kinematics and gdim == 3:
         yield Fault("mesh.kinematics", scene.mesh.kinematics, "nothing for a 3D mesh")
+    components = components_of(gdim, scene.mesh.kinematics if scene.mesh else None)
     for number, motion in enumerate(scene.motion):
-        if motion is not None and motion.direction not in "xyz"[:gdim]:
-            expected = f"{' or '.join('xyz'[:gdim])}: the mesh has {gdim} dimensions"
-            yield Fault(f"motion[{number}].direction", f'"{motion.direction}"', expected)
+        if motion is not None and motion.direction not in components:
+            yield direction_fault(f"motion[{number}].direction", motion.direction, components)
 
 
 def _distribute(data: MeshData | None, comm: MPI.Comm) -> Mesh:

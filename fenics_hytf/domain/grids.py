@@ -78,6 +78,30 @@ def column_mesh(column: Column) -> MeshData:
     )
 
 
+def stack_mesh(
+    levels: npt.NDArray[np.float64], soils: Sequence[str], width: float, gdim: int
+) -> MeshData:
+    """Mesh a stack of single cells, numbered from the bottom up.
+
+    Args:
+        levels: Heights of their faces, ascending [m], shape ``(num_cells + 1,)``.
+        soils: Soil of each cell.
+        width: Of the stack [m].
+        gdim: Space dimension.
+
+    Returns:
+        Quadrilaterals or hexahedra with the boundaries of a box.
+    """
+    across = [np.array([0.0, width])] * (gdim - 1)
+    points, cells = _grid([*across, levels])
+    names = tuple(dict.fromkeys(soils))
+    region = np.array([names.index(soil) for soil in soils], np.int32)
+    low, high = np.zeros(gdim), np.full(gdim, width)
+    low[-1], high[-1] = levels[0], levels[-1]
+    cell_type = "quadrilateral" if gdim == 2 else "hexahedron"
+    return MeshData(points, cells, cell_type, 1, region, names, box_sides(low, high))
+
+
 def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
     """Mesh a box with equal cells.
 

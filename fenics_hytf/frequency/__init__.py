@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sweeps over frequencies of an affine complex symmetric system."""
 
-from fenics_hytf.frequency.direct import SymmetricFactorisation, direct_sweep
+from fenics_hytf.frequency.direct import Loads, SymmetricFactorisation, direct_sweep
 from fenics_hytf.frequency.errors import (
     FactorisationError,
     ResidualError,
@@ -9,12 +9,19 @@ from fenics_hytf.frequency.errors import (
     SweepError,
 )
 from fenics_hytf.frequency.sweep import DenseSweep, Sweep
-from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction, constant, hysteretic
+from fenics_hytf.frequency.system import (
+    DynamicSystem,
+    ScalarFunction,
+    constant,
+    hysteretic,
+    radiation,
+)
 
 __all__ = [
     "DenseSweep",
     "DynamicSystem",
     "FactorisationError",
+    "Loads",
     "ResidualError",
     "ResonanceError",
     "ScalarFunction",
@@ -24,4 +31,5 @@ __all__ = [
     "constant",
     "direct_sweep",
     "hysteretic",
+    "radiation",
 ]

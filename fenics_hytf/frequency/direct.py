@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -187,9 +188,19 @@ class SymmetricFactorisation:
         return self._true_residual(b, x)
 
 
+class Loads(Protocol):
+    """Right-hand sides that differ from line to line."""
+
+    def __len__(self) -> int:
+        """How many a line has."""
+
+    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
+        """Return those of a line by its number, borrowed until the next call."""
+
+
 def direct_sweep(
     system: DynamicSystem,
-    b: PETSc.Vec | Sequence[PETSc.Vec],
+    b: PETSc.Vec | Sequence[PETSc.Vec] | Loads,
     s: npt.ArrayLike,
     tolerance: float = 1e-6,
     progress: Callable[[int, int], None] | None = None,
@@ -198,7 +209,7 @@ def direct_sweep(
 
     Args:
         system: The system.
-        b: Right-hand side, or several.
+        b: Right-hand side, or several; or what gives those of each line.
         s: Complex frequencies η + iω [rad/s], shape ``(num_lines,)``.
         tolerance: Relative residual that every solve must reach [-].
         progress: Called with the lines done and their number.
@@ -211,20 +222,20 @@ def direct_sweep(
         ResonanceError: A line lies on an undamped resonance.
         ResidualError: A residual stays above the tolerance.
     """
-    sides = [b] if isinstance(b, PETSc.Vec) else list(b)
     lines = np.atleast_1d(np.asarray(s, np.complex128))
-    num_local = sides[0].getLocalSize()
+    sides = [b] if isinstance(b, PETSc.Vec) else b
+    num_local = system.mass.getLocalSize()[0]
     # One unknown a row of memory: each solution is a column, contiguous for PETSc.
     values = np.empty((num_local, len(lines) * len(sides)), np.complex128, order="F")
     residuals = np.empty((len(lines), len(sides)))
     column = PETSc.Vec().createWithArray(
-        np.empty(num_local, np.complex128), size=sides[0].getSizes(), comm=system.comm
+        np.empty(num_local, np.complex128), size=system.mass.getSizes()[0], comm=system.comm
     )
     try:
         with SymmetricFactorisation(system) as factorisation:
             for line, frequency in enumerate(lines):
                 factorisation.factorise(complex(frequency))
-                for side, right in enumerate(sides):
+                for side, right in enumerate(sides(line) if callable(sides) else sides):
                     column.placeArray(values[:, line * len(sides) + side])
                     residuals[line, side] = factorisation.solve(right, column, tolerance)
                     column.resetArray()

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: MIT
 """One lapse: the ground, its equations, the equivalent-linear loop, the response, convection."""
 
+from fenics_hytf.lapse.base import BaseProbe, outcrop_motion, within_motion
 from fenics_hytf.lapse.convective import cell_stress, convect
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
 from fenics_hytf.lapse.errors import EmptyCellError, EquivalentLinearError, LapseError
+from fenics_hytf.lapse.free_field import FreeField
 from fenics_hytf.lapse.ground import (
     ElasticConstants,
     Ground,
     Moduli,
     complex_constants,
+    seed_points,
     survey,
 )
 from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
@@ -25,6 +28,7 @@ from fenics_hytf.lapse.strain import shear_strain
 
 __all__ = [
     "Anderson",
+    "BaseProbe",
     "CellPeaks",
     "CellProbe",
     "CellState",
@@ -33,6 +37,7 @@ __all__ = [
     "Equations",
     "EquivalentLinearError",
     "Excitation",
+    "FreeField",
     "Ground",
     "Histories",
     "LapseEquations",
@@ -49,7 +54,10 @@ __all__ = [
     "excite",
     "first_strain",
     "iterate",
+    "outcrop_motion",
+    "seed_points",
     "shear_strain",
     "solve",
     "survey",
+    "within_motion",
 ]

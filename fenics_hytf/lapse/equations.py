@@ -1,13 +1,21 @@
 # SPDX-License-Identifier: MIT
 """The equations of one lapse, M ü + K* u = −M r ü_b (1)–(4), on the unknowns q of u = T q.
 
+u is relative to the motion that is given: that of a rigid base, or the outcrop motion of the rock
+below a compliant one. Seen from there the rock brings no force but that of its dashpots ρV* at the
+base, and the right-hand side is the same in both cases: with u_o = r a_o/s² subtracted from the
+total motion, s C r u_o of the incoming wave leaves with s C u of the dashpots (Lysmer and
+Kuhlemeyer 1969; Joyner and Chen 1975), and K r = 0.
+
 Matrices and forms are made once a run and refilled; what the scene does not call for is not made.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +23,37 @@ from dolfinx.fem import Function
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain, constraint_matrix
-from fenics_hytf.frequency import DynamicSystem, constant, hysteretic
-from fenics_hytf.lapse.ground import ElasticConstants
-from fenics_hytf.operators import ElasticForm, GeometricForm, assemble_mass, rayleigh_damping
+from fenics_hytf.frequency import (
+    DynamicSystem,
+    Loads,
+    ScalarFunction,
+    constant,
+    hysteretic,
+    radiation,
+)
+from fenics_hytf.lapse.ground import ElasticConstants, Ground
+from fenics_hytf.operators import (
+    DashpotForm,
+    ElasticForm,
+    GeometricForm,
+    assemble_mass,
+    rayleigh_damping,
+)
 from fenics_hytf.particles import Points, particle_mass_matrix, transfer_matrix
 from fenics_hytf.scene import Scene
+from fenics_hytf.soil import complex_factor
+
+RealArray = npt.NDArray[np.float64]
+
+
+class SideForce(Protocol):
+    """What the ground beyond a side does to it; see :mod:`fenics_hytf.lapse.free_field`."""
+
+    def fasten(self, normal: RealArray, tangential: RealArray) -> None:
+        """Take the impedances of the section's cells [kg/(m² s)], shape ``(num_local_cells,)``."""
+
+    def add_force(self, line: int, motion: int, nodal: PETSc.Vec) -> None:
+        """Add its nodal forces for a unit of a motion at a line."""
 
 
 @dataclass(frozen=True)
@@ -28,11 +62,11 @@ class LapseEquations:
 
     Attributes:
         system: A(s) of the lapse.
-        sides: −TᵀM r of each motion [kg].
+        loads: −TᵀM r of each motion [kg], with what comes from beyond the sides.
     """
 
     system: DynamicSystem
-    sides: list[PETSc.Vec]
+    loads: list[PETSc.Vec] | Loads
 
 
 class Equations:
@@ -42,30 +76,53 @@ class Equations:
         scene: The scene: boundaries, effects, directions of the motions.
         domain: The domain.
         assemblies: Counts assemblies by the name of the form.
+        side_forces: Of the sides with free field.
     """
 
-    def __init__(self, scene: Scene, domain: Domain, assemblies: Counter[str]) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        domain: Domain,
+        assemblies: Counter[str],
+        side_forces: Sequence[SideForce] = (),
+    ) -> None:
         self._domain = domain
-        self._effects = scene.effects
+        self._scene = scene
         self._assemblies = assemblies
         self._elastic = ElasticForm(domain)
         self._geometric = GeometricForm(domain) if scene.effects.geometric_stiffness else None
         self.axes = tuple(domain.components.index(m.direction) for m in scene.motion)
-        self.T = constraint_matrix(domain, scene.boundary, self.axes)
+        supports = scene.supports
+        self.T = constraint_matrix(domain, supports, self.axes)
+        sides = [name for name, kind in supports.items() if kind in ("dashpot", "free_field")]
+        self._dashpots = DashpotForm(domain, sides) if sides else None
+        self._side_forces = side_forces
+        self.base_is_held = supports.get("base") != "compliant"
         self._K = self._elastic.create_matrix()
-        # On the unknowns: mass, real, imaginary and geometric stiffness, made when first needed.
+        # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
-        self._sides: list[PETSc.Vec] = []
+        # Of each motion: M r at the nodes, −TᵀM r, and that with the forces of a line.
+        self._influence: list[PETSc.Vec] = []
+        self._inertia: list[PETSc.Vec] = []
+        self._loaded: list[PETSc.Vec] = []
 
     @property
     def num_unknowns(self) -> int:
         """Unknowns of all ranks."""
         return int(self.T.getSize()[1])
 
+    @property
+    def influence(self) -> list[PETSc.Vec]:
+        """M r of each motion at the nodes [kg], borrowed until the points are weighed again."""
+        return self._influence
+
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        for owned in (self.T, self._K, *self._constrained.values(), *self._sides):
+        for owned in (self.T, self._K, *self._constrained.values(), *self._vectors()):
             owned.destroy()
+
+    def _vectors(self) -> list[PETSc.Vec]:
+        return [*self._influence, *self._inertia, *self._loaded]
 
     def weigh(self, points: Points) -> None:
         """Rebuild M = SᵀM_pS (4) and the right-hand sides −TᵀM r from the points.
@@ -78,29 +135,46 @@ class Equations:
         nodal = particle_mass_matrix(transfer_matrix(points, self._domain.V), points.mass)
         M = assemble_mass(self._domain, nodal, self._K)
         self._assemblies["mass"] += 1
-        for side in self._sides:
-            side.destroy()
+        for vector in self._vectors():
+            vector.destroy()
         # M r on all nodes, before constraining: held ones pull on their neighbours too.
-        self._sides = [self._influence(M, direction) for direction in self.axes]
+        self._influence = [self._weigh_direction(M, direction) for direction in self.axes]
+        self._inertia = [self._inertia_force(Mr) for Mr in self._influence]
+        self._loaded = [load.duplicate() for load in self._inertia if self._side_forces]
         self._constrain("mass", M)
         M.destroy()
 
     def _pattern(self) -> None:
-        """Give K its pattern, before any value is known."""
+        """Give K its pattern, before any value is known, and the base its dashpots."""
         cells = len(self._domain.regions)
         self._elastic.assemble(self._K, np.ones(cells), np.ones(cells))
         self._constrain("real", self._K)
+        if not self.base_is_held:
+            self._stand_on_rock(cells)
 
-    def _influence(self, M: PETSc.Mat, direction: int) -> PETSc.Vec:
+    def _stand_on_rock(self, cells: int) -> None:
+        rock = self._scene.boundary.rock
+        assert rock is not None
+        impedance = [
+            np.full(cells, rock.density * velocity)
+            for velocity in (rock.p_wave_velocity, rock.shear_wave_velocity)
+        ]
+        DashpotForm(self._domain, ["base"]).assemble(self._K, *impedance)
+        self._assemblies["dashpot"] += 1
+        self._constrain("base", self._K)
+
+    def _weigh_direction(self, M: PETSc.Mat, direction: int) -> PETSc.Vec:
         r, Mr = M.createVecs()
-        r.array[direction :: self._domain.gdim] = 1.0
+        r.array[direction :: self._domain.num_components] = 1.0
         M.mult(r, Mr)
-        side = self.T.createVecRight()
-        self.T.multTranspose(Mr, side)
-        side.scale(-1.0)
         r.destroy()
-        Mr.destroy()
-        return side
+        return Mr
+
+    def _inertia_force(self, Mr: PETSc.Vec) -> PETSc.Vec:
+        force = self.T.createVecRight()
+        self.T.multTranspose(Mr, force)
+        force.scale(-1.0)
+        return force
 
     def _constrain(self, name: str, matrix: PETSc.Mat) -> PETSc.Mat:
         """A_q = TᵀAT, into the matrix kept under a name."""
@@ -109,14 +183,11 @@ class Equations:
         return self._constrained[name]
 
     def _stiffness(self, name: str, constants: ElasticConstants) -> PETSc.Mat:
-        cells = self._domain.input_cells
-        self._elastic.assemble(
-            self._K, constants.lame_lambda[cells], constants.shear_modulus[cells]
-        )
+        self._elastic.assemble(self._K, *constants.at(self._domain.input_cells))
         self._assemblies["elasticity"] += 1
         return self._constrain(name, self._K)
 
-    def stiffen(self, stress: npt.NDArray[np.float64]) -> None:
+    def stiffen(self, stress: RealArray) -> None:
         """Rebuild K_NL, for a scene that calls for geometric stiffness.
 
         Args:
@@ -128,11 +199,12 @@ class Equations:
             self._constrain("geometric", self._K)
 
     def assemble(
-        self, real: ElasticConstants, imaginary: ElasticConstants | None
+        self, ground: Ground, real: ElasticConstants, imaginary: ElasticConstants | None
     ) -> LapseEquations:
         """Assemble A(s) with the moduli of an iteration.
 
         Args:
+            ground: The ground, for its density.
             real: Real parts of the elastic constants, cells in the order of the input.
             imaginary: Imaginary parts, or ``None`` without material damping.
 
@@ -140,31 +212,69 @@ class Equations:
             The equations, valid until the next call.
         """
         K = self._stiffness("real", real)
-        M = self._constrained["mass"]
-        terms = [(K, constant)]
-        C = None
-        if self._effects.rayleigh is not None:
-            factors = self._effects.rayleigh
-            old = self._constrained.pop("rayleigh", None)
-            if old is not None:
-                old.destroy()
-            C = rayleigh_damping(M, K, factors.alpha, factors.beta)
-            self._constrained["rayleigh"] = C
-            self._assemblies["rayleigh"] += 1
+        terms: list[tuple[PETSc.Mat, ScalarFunction]] = [(K, constant)]
         if imaginary is not None:
             terms.append((self._stiffness("imaginary", imaginary), hysteretic))
         if "geometric" in self._constrained:
             terms.append((self._constrained["geometric"], constant))
-        return LapseEquations(DynamicSystem(terms, M, C), self._sides)
+        if not self.base_is_held:
+            terms.append((self._constrained["base"], self._radiation()))
+        system = DynamicSystem(terms, self._constrained["mass"], self._damping(K, ground, real))
+        return LapseEquations(system, _LineLoads(self) if self._side_forces else self._inertia)
 
-    def expand(self, q: npt.NDArray[np.complex128]) -> npt.NDArray[np.float64]:
+    def _radiation(self) -> ScalarFunction:
+        """Of the dashpots ρV* at the base, with the complex modulus of the rock."""
+        rock = self._scene.boundary.rock
+        assert rock is not None
+        return radiation(complex(complex_factor(rock.damping, self._scene.solver.complex_modulus)))
+
+    def _damping(
+        self, K: PETSc.Mat, ground: Ground, constants: ElasticConstants
+    ) -> PETSc.Mat | None:
+        """C: Rayleigh damping, and the dashpots of the sides with the cells' own moduli."""
+        C, rayleigh = None, self._scene.effects.rayleigh
+        if rayleigh is not None:
+            if "rayleigh" in self._constrained:
+                self._constrained.pop("rayleigh").destroy()
+            C = rayleigh_damping(self._constrained["mass"], K, rayleigh.alpha, rayleigh.beta)
+            self._constrained["rayleigh"] = C
+            self._assemblies["rayleigh"] += 1
+        if self._dashpots is None:
+            return C
+        lame, shear = constants.at(self._domain.input_cells)
+        density = ground.density[self._domain.input_cells]
+        impedance = np.sqrt(density * (lame + 2 * shear)), np.sqrt(density * shear)
+        self._dashpots.assemble(self._K, *impedance)
+        self._assemblies["dashpot"] += 1
+        for side in self._side_forces:
+            side.fasten(*impedance)
+        dashpots = self._constrain("dashpot", self._K)
+        if C is None:
+            return dashpots
+        C.axpy(1.0, dashpots, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return C
+
+    def loads(self, line: int) -> list[PETSc.Vec]:
+        """Right-hand sides with the forces from beyond the sides, which differ between lines."""
+        nodal = self.T.createVecLeft()
+        for motion, (load, inertia) in enumerate(zip(self._loaded, self._inertia, strict=True)):
+            nodal.zeroEntries()
+            for side in self._side_forces:
+                side.add_force(line, motion, nodal)
+            self.T.multTranspose(nodal, load)
+            load.axpy(1.0, inertia)
+        nodal.destroy()
+        return self._loaded
+
+    def expand(self, q: npt.NDArray[np.complex128]) -> RealArray:
         """Nodal field u = T q of a real response.
 
         Args:
             q: This rank's unknowns, shape ``(num_local_unknowns,)``.
 
         Returns:
-            Real part at the local nodes, ghosts included, shape ``(num_local_nodes, gdim)``.
+            Real part at the local nodes, ghosts included, shape
+            ``(num_local_nodes, num_components)``.
         """
         unknowns, nodes = self.T.createVecs()
         unknowns.array[:] = q
@@ -174,4 +284,17 @@ class Equations:
         u.x.scatter_forward()
         unknowns.destroy()
         nodes.destroy()
-        return u.x.array.real.reshape(-1, self._domain.gdim).copy()
+        return u.x.array.real.reshape(-1, self._domain.num_components).copy()
+
+
+@dataclass(frozen=True)
+class _LineLoads:
+    """Right-hand sides that differ from line to line."""
+
+    equations: Equations
+
+    def __len__(self) -> int:
+        return len(self.equations.axes)
+
+    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
+        return self.equations.loads(line)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fenics_hytf.lapse.errors import EquivalentLinearError
 from fenics_hytf.lapse.ground import Ground, Moduli
 from fenics_hytf.lapse.records import LoopHistory
-from fenics_hytf.scene import EquivalentLinear
+from fenics_hytf.scene import EquivalentLinear, Scene
 
 RealArray = npt.NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def iterate(
         changes.append(float(change[worst[-1]]))
         report(iteration, changes[-1])
         if changes[-1] <= settings.tolerance:
-            return moduli, effective, LoopHistory(tuple(changes), tuple(worst))
+            return moduli, effective, LoopHistory(tuple(changes), tuple(worst), change)
         if accelerated is None and changes[-1] <= _PICARD:
             accelerated = Anderson()
         if accelerated is not None:
@@ -116,16 +116,18 @@ def iterate(
     raise EquivalentLinearError(settings.max_iterations, changes[-1], settings.tolerance, worst[-1])
 
 
-def first_strain(ground: Ground, density: RealArray, velocity: float, ratio: float) -> RealArray:
+def first_strain(scene: Scene, ground: Ground) -> RealArray:
     """A first guess, ratio × PGV/Vs, of the effective strain.
 
     Args:
+        scene: The scene, for its motions.
         ground: The ground.
-        density: Of every cell [kg/m^3], shape ``(num_cells,)``.
-        velocity: Peak velocity of the input [m/s].
-        ratio: Effective over peak strain [-].
 
     Returns:
-        [-], shape ``(num_cells,)``.
+        Of every cell [-], shape ``(num_cells,)``; nought without the equivalent-linear loop.
     """
-    return ratio * velocity / np.sqrt(ground.shear_modulus / density)
+    loop = scene.effects.equivalent_linear
+    if loop is None:
+        return np.zeros(len(ground.region))
+    velocity = max(float(np.abs(m.record.velocity()).max()) for m in scene.motion)
+    return loop.strain_ratio * velocity / np.sqrt(ground.shear_modulus / ground.density)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.domain import Domain
+from fenics_hytf.domain import Domain, distance_to_sides
 from fenics_hytf.lapse.errors import EmptyCellError
-from fenics_hytf.particles import Points
+from fenics_hytf.particles import Points, seed
 from fenics_hytf.scene import Scene
 from fenics_hytf.soil import Curve, complex_factor
 
@@ -28,19 +28,23 @@ class Ground:
 
     Attributes:
         region: Soil that fills most of the cell, as an index into the region names.
+        density: Mass density [kg/m^3].
         shear_modulus: Small-strain G [Pa].
         poisson: Poisson's ratio [-].
         damping: Damping ratio without curves [-].
         curves: Curves of each region, ``None`` for a linear soil, shape ``(num_regions,)``.
+        absorbing: Damping ratio that an absorbing layer adds [-], or ``None`` without one.
 
-    All but the last have the shape ``(num_cells,)``.
+    All but ``curves`` have the shape ``(num_cells,)``.
     """
 
     region: npt.NDArray[np.int32]
+    density: RealArray
     shear_modulus: RealArray
     poisson: RealArray
     damping: RealArray
     curves: tuple[Curve | None, ...]
+    absorbing: RealArray | None = None
 
     @property
     def nonlinear(self) -> npt.NDArray[np.bool_]:
@@ -86,6 +90,33 @@ class ElasticConstants:
     lame_lambda: RealArray
     shear_modulus: RealArray
 
+    def at(self, cells: npt.NDArray[np.integer]) -> tuple[RealArray, RealArray]:
+        """λ and G of some cells."""
+        return self.lame_lambda[cells], self.shear_modulus[cells]
+
+
+def seed_points(scene: Scene, domain: Domain) -> Points:
+    """Fill the cells with points; only what an effect of the scene carries gets an array.
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+
+    Returns:
+        The points of this rank.
+
+    Raises:
+        SceneError: The mesh's cells have no rule of so many points.
+    """
+    fields = []
+    if scene.effects.convection:
+        fields += ["velocity", "acceleration", "strain"]
+    if scene.effects.geometric_stiffness:
+        fields += ["stress"]
+    density = [scene.soil[name].density for name in domain.region_names]
+    count = scene.mesh.points_in(domain.mesh.topology.cell_name())
+    return seed(domain.mesh, domain.regions, density, count, fields)
+
 
 def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
     """See which soil the points have brought where.
@@ -104,7 +135,10 @@ def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
     soils = [scene.soil[name] for name in domain.region_names]
     with_curves = scene.effects.equivalent_linear is not None
     constants = np.array(
-        [[s.elastic.shear_modulus, s.elastic.poisson, s.damping_ratio(with_curves)] for s in soils]
+        [
+            [s.density, s.elastic.shear_modulus, s.elastic.poisson, s.damping_ratio(with_curves)]
+            for s in soils
+        ]
     )
     owned = domain.num_owned_cells
     mine = np.zeros((owned, len(soils)))
@@ -115,13 +149,23 @@ def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
         raise EmptyCellError([int(cell) for cell in np.flatnonzero(volume == 0)])
     # A cell of one soil takes its constants as they stand, free of round-off.
     region = share.argmax(axis=1).astype(np.int32)
-    mean = np.where(
+    density, shear_modulus, poisson, damping = np.where(
         (share > 0).sum(axis=1)[:, None] == 1,
         constants[region],
         share @ constants / volume[:, None],
-    )
+    ).T
     curves = tuple(s.curve if with_curves else None for s in soils)
-    return Ground(region, mean[:, 0], mean[:, 1], mean[:, 2], curves)
+    absorbing = _absorbing_layer(scene, domain)
+    return Ground(region, density, shear_modulus, poisson, damping, curves, absorbing)
+
+
+def _absorbing_layer(scene: Scene, domain: Domain) -> RealArray | None:
+    """Damping ratio that grows towards some sides (Semblat et al. 2011), every cell."""
+    calm = scene.effects.calm
+    if calm is None:
+        return None
+    distance = distance_to_sides(domain, calm.sides, domain.centroids())
+    return calm.damping * np.maximum(1.0 - distance / calm.thickness, 0.0) ** 2
 
 
 def complex_constants(
@@ -147,6 +191,9 @@ def complex_constants(
         bulk = ground.shear_modulus * 2 * (1 + nu) / (3 * (1 - 2 * nu))
         lame = bulk - 2 / 3 * G
     real = ElasticConstants(lame.real, G.real)
+    if ground.absorbing is not None:
+        absorbed = 1 + 2j * ground.absorbing
+        lame, G = lame.real * absorbed + 1j * lame.imag, G.real * absorbed + 1j * G.imag
     if not np.any(G.imag):
         return real, None
     return real, ElasticConstants(lame.imag, G.imag)

@@ -30,6 +30,12 @@ class CellState:
         peak_stress: Largest shear stress over the lapse [Pa], shape ``(num_cells,)``.
         peak_acceleration: Largest total acceleration at the cell centre, Euclidean norm of the
             components [m/s^2], shape ``(num_cells,)``.
+        peak_velocity: Largest velocity there relative to the base, norm [m/s], shape
+            ``(num_cells,)``.
+        peak_displacement: Largest displacement there relative to the base, norm [m], shape
+            ``(num_cells,)``.
+        change: Last change of the equivalent-linear loop [-], nought where the cell is linear,
+            shape ``(num_cells,)``.
     """
 
     region: npt.NDArray[np.int32]
@@ -41,6 +47,9 @@ class CellState:
     peak_strain: RealArray
     peak_stress: RealArray
     peak_acceleration: RealArray
+    peak_velocity: RealArray
+    peak_displacement: RealArray
+    change: RealArray
 
 
 @dataclass(frozen=True)
@@ -50,10 +59,12 @@ class LoopHistory:
     Attributes:
         change: Per iteration max over cells of ``|G_new - G_old|/G_new`` and ``|dD|/D`` [-].
         worst_cell: Per iteration the input index of the cell that changed most.
+        last: Change of every cell in the last iteration [-], shape ``(num_cells,)``.
     """
 
     change: tuple[float, ...] = ()
     worst_cell: tuple[int, ...] = ()
+    last: RealArray | None = None
 
 
 @dataclass(frozen=True)
@@ -73,11 +84,15 @@ class LapseResult:
         loop: History of the equivalent-linear loop; empty without it.
         frequency: Solved lines [Hz], shape ``(solved_lines,)``.
         transfer: Total acceleration over the input as given, shape
-            ``(num_receivers, gdim, num_motions, solved_lines)`` [-].
-        displacement: Relative to the base [m], shape ``(num_receivers, gdim, num_samples)``.
+            ``(num_receivers, num_components, num_motions, solved_lines)`` [-].
+        displacement: Relative to the base [m], shape
+            ``(num_receivers, num_components, num_samples)``.
         velocity: Relative [m/s], same shape.
         acceleration: Relative [m/s^2], same shape.
         total_acceleration: [m/s^2], same shape.
+        within: Total acceleration of the base in the direction of each motion [m/s^2], shape
+            ``(num_motions, num_samples)``.
+        outcrop: Acceleration of the bare rock likewise, or ``None`` where it is not known.
         cells: Values of the cells.
         ledger: Points and their mass after the lapse's convective phase.
     """
@@ -98,5 +113,7 @@ class LapseResult:
     velocity: RealArray
     acceleration: RealArray
     total_acceleration: RealArray
+    within: RealArray
+    outcrop: RealArray | None
     cells: CellState
     ledger: MassLedger

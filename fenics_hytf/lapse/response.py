@@ -63,6 +63,11 @@ class Excitation:
         """Circular frequency of the lines [rad/s]."""
         return 2 * np.pi * self.frequency
 
+    @property
+    def s(self) -> ComplexArray:
+        """Complex frequency iω of the lines [rad/s]."""
+        return np.asarray(1j * self.omega, np.complex128)
+
     def to_time(self, coefficients: ComplexArray) -> RealArray:
         """Sum the lines at every sample.
 
@@ -135,7 +140,7 @@ class ReceiverProbe:
         numbers: npt.NDArray[np.intp],
         count: int,
     ) -> None:
-        local = displacement_rows(transfer_matrix(sites, domain.V), domain.gdim)
+        local = displacement_rows(transfer_matrix(sites, domain.V), domain.num_components)
         self._rows = constrained_rows(domain, local, T)
         self._domain, self._numbers, self._count = domain, numbers, count
 
@@ -143,18 +148,28 @@ class ReceiverProbe:
         """Destroy the rows."""
         self._rows.destroy()
 
-    def histories(self, sweep: Sweep, excitation: Excitation) -> Histories:
-        """Histories and transfer functions of all receivers, on every rank (collective)."""
-        gdim, omega = self._domain.gdim, excitation.omega
+    def histories(self, sweep: Sweep, excitation: Excitation, base: ComplexArray) -> Histories:
+        """Histories and transfer functions of all receivers, on every rank (collective).
+
+        Args:
+            sweep: Transfer functions h.
+            excitation: The input.
+            base: Those of the base, which relative motion is relative to, shape
+                ``(num_components, num_motions, num_lines)``.
+
+        Returns:
+            The histories.
+        """
+        omega = excitation.omega
         mine = sweep.project(self._rows)
         # A receiver that no rank holds rode a point that has left the mesh: not a number.
-        h = np.full((self._count, gdim, len(excitation.axes), len(omega)), np.nan, complex)
+        h = np.full((self._count, *base.shape), np.nan, complex)
         for numbers, part in self._domain.comm.allgather((self._numbers, mine)):
-            h[numbers] = part.reshape(len(numbers), gdim, *part.shape[1:])
+            h[numbers] = part.reshape(len(numbers), *base.shape)
         transfer = -(omega**2) * h
         for motion, axis in enumerate(excitation.axes):
             transfer[:, axis, motion] += 1.0
-        u, total = excitation.respond(h), excitation.respond(transfer)
+        u, total = excitation.respond(h - base), excitation.respond(transfer)
         return Histories(
             transfer,
             excitation.to_time(u),
@@ -172,11 +187,15 @@ class CellPeaks:
         strain: Shear strain [-], shape ``(num_cells,)``.
         stress: Shear stress [Pa], shape ``(num_cells,)``.
         acceleration: Norm of the total acceleration [m/s^2], shape ``(num_cells,)``.
+        velocity: Norm of the velocity relative to the base [m/s], shape ``(num_cells,)``.
+        displacement: Norm of the displacement relative to the base [m], shape ``(num_cells,)``.
     """
 
     strain: RealArray
     stress: RealArray
     acceleration: RealArray
+    velocity: RealArray
+    displacement: RealArray
 
 
 class CellProbe:
@@ -196,8 +215,9 @@ class CellProbe:
         for block in range(blocks):
             first, stop = min(block * _BLOCK, owned), min((block + 1) * _BLOCK, owned)
             centres = cell_centres(domain.mesh, first, stop)
-            strain = strain_rows(gradient_matrices(centres, domain.V))
-            place = displacement_rows(transfer_matrix(centres, domain.V), domain.gdim)
+            count = domain.num_components
+            strain = strain_rows(gradient_matrices(centres, domain.V), count)
+            place = displacement_rows(transfer_matrix(centres, domain.V), count)
             rows = (constrained_rows(domain, r, T) for r in (strain, place))
             self._blocks.append((slice(first, stop), *rows))
 
@@ -209,9 +229,9 @@ class CellProbe:
 
     def _strain(self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation) -> ComplexArray:
         """Strain spectra of a block, shape ``(num_cells, num_strains, num_lines)``."""
-        gdim = self._domain.gdim
         spectra = excitation.respond(sweep.project(rows))
-        num_strains = gdim * (gdim + 1) // 2
+        gdim = self._domain.gdim
+        num_strains = gdim if self._domain.num_components == 1 else gdim * (gdim + 1) // 2
         return spectra.reshape(len(spectra) // num_strains, num_strains, spectra.shape[-1])
 
     def peak_strain(self, sweep: Sweep, excitation: Excitation) -> RealArray:
@@ -230,21 +250,26 @@ class CellProbe:
             peak[cells] = shear_strain(history, self._convention).max(axis=1, initial=0.0)
         return self._domain.gather_cells(peak)
 
-    def peaks(self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray) -> CellPeaks:
-        """Largest strain, stress and acceleration of every cell (collective).
+    def peaks(
+        self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray, base: ComplexArray
+    ) -> CellPeaks:
+        """Largest strain, stress and motion of every cell (collective).
 
         Args:
             sweep: Transfer functions h.
             excitation: The input.
             modulus: Complex shear modulus G* of every cell [Pa], shape ``(num_cells,)``.
+            base: Transfer functions of the base, which relative motion is relative to, shape
+                ``(num_components, num_motions, num_lines)``.
 
         Returns:
             The peaks.
         """
         domain = self._domain
         mine = modulus[domain.input_cells[: domain.num_owned_cells]]
-        peak = np.empty((domain.num_owned_cells, 3))
+        peak = np.empty((domain.num_owned_cells, 5))
         at_rest = excitation.omega == 0
+        still = excitation.respond(base)
         for cells, strain, place in self._blocks:
             spectra = self._strain(strain, sweep, excitation)
             # G* is real at ω = 0.
@@ -252,17 +277,19 @@ class CellProbe:
             for column, values in ((0, spectra), (1, factor * spectra)):
                 history = shear_strain(excitation.to_time(values), self._convention)
                 peak[cells, column] = history.max(axis=1, initial=0.0)
-            total = self._total_acceleration(place, sweep, excitation)
-            peak[cells, 2] = np.linalg.norm(total, axis=1).max(axis=1, initial=0.0)
+            u = excitation.respond(sweep.project(place))
+            u = u.reshape(cells.stop - cells.start, *still.shape)
+            for column, values in enumerate(_motions(u, u - still, excitation), start=2):
+                distance = np.linalg.norm(excitation.to_time(values), axis=1)
+                peak[cells, column] = distance.max(axis=1, initial=0.0)
         return CellPeaks(*domain.gather_cells(peak).T)
 
-    def _total_acceleration(
-        self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation
-    ) -> RealArray:
-        gdim = self._domain.gdim
-        u = excitation.respond(sweep.project(rows))
-        u = u.reshape(len(u) // gdim, gdim, u.shape[-1])
-        total = -(excitation.omega**2) * u
-        for motion, axis in enumerate(excitation.axes):
-            total[:, axis] += excitation.weights[motion]
-        return excitation.to_time(total)
+
+def _motions(
+    u: ComplexArray, relative: ComplexArray, excitation: Excitation
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Spectra of total acceleration, relative velocity and relative displacement."""
+    total = -(excitation.omega**2) * u
+    for motion, axis in enumerate(excitation.axes):
+        total[:, axis] += excitation.weights[motion]
+    return total, 1j * excitation.omega * relative, relative

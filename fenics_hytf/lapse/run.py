@@ -123,12 +123,12 @@ def solve(
     def sweep_with(moduli: Moduli, iteration: int) -> Sweep:
         with observer.phase("assembly"):
             parts = complex_constants(ground, moduli, solver.complex_modulus, solver.keep)
-            lapse = equations.assemble(*parts)
+            lapse = equations.assemble(ground, *parts)
         with observer.phase("sweep"):
             sweep = direct_sweep(
                 lapse.system,
-                lapse.sides,
-                1j * excitation.omega,
+                lapse.loads,
+                excitation.s,
                 solver.tolerance,
                 lambda done, total: observer.sweeping(iteration, done, total),
             )

@@ -3,6 +3,7 @@
 
 In plane strain QUAD4M's in-plane convention √((ε_x − ε_y)² + γ_xy²) is the default; ``3d`` takes
 ε_z = 0 as the third principal strain. In three dimensions all three principal strains count.
+Across a plane (SH) the two shears make one, √(γ_xz² + γ_yz²).
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ def shear_strain(strain: RealArray, convention: str = "plane") -> RealArray:
     """Largest difference of principal strains at every instant.
 
     Args:
-        strain: Voigt components xx, yy, [zz, yz, xz,] xy with shear as γ = 2ε [-], shape
-            ``(n, 3 or 6, num_samples)``.
+        strain: Voigt components xx, yy, [zz, yz, xz,] xy with shear as γ = 2ε [-], or xz, yz of a
+            section that moves across its plane, shape ``(n, 2, 3 or 6, num_samples)``.
         convention: ``"plane"`` or ``"3d"``, for three components.
 
     Returns:
@@ -26,6 +27,8 @@ def shear_strain(strain: RealArray, convention: str = "plane") -> RealArray:
     """
     if strain.shape[1] == 6:
         return _spatial(strain)
+    if strain.shape[1] == 2:
+        return np.hypot(strain[:, 0], strain[:, 1])
     xx, yy, xy = strain[:, 0], strain[:, 1], strain[:, 2]
     in_plane = np.hypot(xx - yy, xy)
     if convention == "plane":

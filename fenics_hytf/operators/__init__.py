@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: MIT
 """Stiffness, mass and damping matrices, and evaluation at sites as matrices."""
 
+from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
 from fenics_hytf.operators.rows import constrained_rows, displacement_rows, strain_rows
 
 __all__ = [
+    "DashpotForm",
     "ElasticForm",
     "GeometricForm",
+    "TractionForm",
     "assemble_mass",
+    "boundary_area",
     "constrained_rows",
     "displacement_rows",
+    "mean_rows",
     "rayleigh_damping",
     "strain_rows",
 ]

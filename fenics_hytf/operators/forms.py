@@ -21,7 +21,7 @@ from fenics_hytf.domain import Domain
 
 
 class ElasticForm:
-    """K_L of an isotropic linear material, plane strain in 2D.
+    """K_L of an isotropic linear material; in 2D plane strain, or shear across the plane.
 
     Args:
         domain: The domain.
@@ -32,12 +32,14 @@ class ElasticForm:
         self._lame_lambda, self._shear_modulus = Function(cells), Function(cells)
         u, v = ufl.TrialFunction(domain.V), ufl.TestFunction(domain.V)
 
-        def strain(w: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-            return ufl.sym(ufl.grad(w))
-
-        stress = self._lame_lambda * ufl.tr(strain(u)) * ufl.Identity(domain.gdim)
-        stress += 2 * self._shear_modulus * strain(u)
-        self._form = form(ufl.inner(stress, strain(v)) * _dx(domain))
+        if domain.num_components == 1:
+            density = self._shear_modulus * ufl.inner(ufl.grad(u), ufl.grad(v))
+        else:
+            strain_u, strain_v = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
+            stress = self._lame_lambda * ufl.tr(strain_u) * ufl.Identity(domain.gdim)
+            stress += 2 * self._shear_modulus * strain_u
+            density = ufl.inner(stress, strain_v)
+        self._form = form(density * _dx(domain))
 
     def create_matrix(self) -> PETSc.Mat:
         """Return a matrix with the form's pattern; the caller destroys it."""

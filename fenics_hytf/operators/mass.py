@@ -24,9 +24,9 @@ def assemble_mass(domain: Domain, nodal: csr_matrix, pattern: PETSc.Mat) -> PETS
     """
     M = pattern.duplicate(copy=False)
     M.zeroEntries()
-    gdim = domain.gdim
-    blocks = np.zeros((nodal.nnz, gdim, gdim), PETSc.ScalarType)
-    blocks[:, range(gdim), range(gdim)] = nodal.data[:, None]
+    count = domain.num_components
+    blocks = np.zeros((nodal.nnz, count, count), PETSc.ScalarType)
+    blocks[:, range(count), range(count)] = nodal.data[:, None]
     M.setValuesBlockedLocalIJV(
         nodal.indptr.astype(PETSc.IntType),
         nodal.indices.astype(PETSc.IntType),

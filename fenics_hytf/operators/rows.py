@@ -16,31 +16,37 @@ from scipy import sparse
 from fenics_hytf.domain import Domain
 
 
-def displacement_rows(S: sparse.csr_matrix, gdim: int) -> sparse.csr_matrix:
+def displacement_rows(S: sparse.csr_matrix, num_components: int) -> sparse.csr_matrix:
     """Rows that evaluate the displacement.
 
     Args:
         S: Shape functions at the sites, shape ``(num_sites, num_local_nodes)``.
-        gdim: Space dimension.
+        num_components: Displacement components of a node.
 
     Returns:
-        Shape ``(num_sites·gdim, num_local_nodes·gdim)``, components fastest.
+        Shape ``(num_sites·num_components, num_local_nodes·num_components)``, components fastest.
     """
-    return sparse.csr_matrix(sparse.kron(S, sparse.identity(gdim)))
+    return sparse.csr_matrix(sparse.kron(S, sparse.identity(num_components)))
 
 
-def strain_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
+def strain_rows(gradients: Sequence[sparse.csr_matrix], num_components: int) -> sparse.csr_matrix:
     """Rows that evaluate the strain in Voigt order: xx, yy, [zz, yz, xz,] xy, shear as γ = 2ε.
+
+    A section that moves across its plane has the shears xz and yz.
 
     Args:
         gradients: ∂N/∂x_j at the sites [1/m], one matrix an axis, shape
             ``(num_sites, num_local_nodes)`` each.
+        num_components: Displacement components of a node; 1 across a section.
 
     Returns:
-        Shape ``(num_sites·num_strains, num_local_nodes·gdim)``, strain components fastest.
+        Shape ``(num_sites·num_strains, num_local_nodes·num_components)``, strain components
+        fastest.
     """
     gdim = len(gradients)
     num_sites = gradients[0].shape[0]
+    if num_components == 1:
+        return _interleave(gradients, num_sites)
     pairs = [(i, i) for i in range(gdim)]
     pairs += [(1, 2), (0, 2), (0, 1)] if gdim == 3 else [(0, 1)]
     parts = []
@@ -49,8 +55,13 @@ def strain_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
         if i != j:
             part = part + sparse.kron(gradients[i], _unit(j, gdim))
         parts.append(part)
+    return _interleave(parts, num_sites)
+
+
+def _interleave(parts: Sequence[sparse.csr_matrix], num_sites: int) -> sparse.csr_matrix:
+    """Rows of all parts, site by site."""
     stacked = sparse.csr_matrix(sparse.vstack(parts))
-    order = np.arange(len(pairs) * num_sites).reshape(len(pairs), num_sites).T.ravel()
+    order = np.arange(len(parts) * num_sites).reshape(len(parts), num_sites).T.ravel()
     return stacked[order]
 
 
@@ -69,9 +80,9 @@ def constrained_rows(domain: Domain, local: sparse.csr_matrix, T: PETSc.Mat) -> 
     Returns:
         Distributed matrix, this rank's rows first to last; the caller destroys it.
     """
-    index_map, gdim = domain.V.dofmap.index_map, domain.gdim
+    index_map, count = domain.V.dofmap.index_map, domain.num_components
     nodes = index_map.local_to_global(np.arange(index_map.size_local + index_map.num_ghosts))
-    columns = (nodes[:, None] * gdim + np.arange(gdim)).ravel()
+    columns = (nodes[:, None] * count + np.arange(count)).ravel()
     rows = PETSc.Mat().createAIJ(
         ((local.shape[0], None), (T.getLocalSize()[0], None)),
         csr=(

@@ -5,11 +5,11 @@ A scene is read and checked whole before anything is computed; every fault is re
 each with its key, what was found and what was expected. How anything is solved is not known here.
 """
 
-from fenics_hytf.scene.boundary import default_kind
+from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
-from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh
-from fenics_hytf.scene.motion import MotionInput
+from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh, components_of
+from fenics_hytf.scene.motion import MotionInput, direction_fault
 from fenics_hytf.scene.quadrature import (
     allowed_points_per_cell,
     default_points_per_cell,
@@ -30,6 +30,7 @@ from fenics_hytf.scene.settings import (
 from fenics_hytf.scene.soil import Soil
 
 __all__ = [
+    "Boundary",
     "Box",
     "Column",
     "Effects",
@@ -44,6 +45,7 @@ __all__ = [
     "Rayleigh",
     "Receiver",
     "Region",
+    "Rock",
     "Scene",
     "SceneError",
     "Sections",
@@ -51,8 +53,10 @@ __all__ = [
     "Solver",
     "allowed_points_per_cell",
     "check",
+    "components_of",
     "default_kind",
     "default_points_per_cell",
+    "direction_fault",
     "examine",
     "rule_degrees",
 ]

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.motion import split
-from fenics_hytf.scene.boundary import read_boundary
+from fenics_hytf.scene.boundary import Boundary, default_kind, read_boundary
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import Mesh, layout, raw_gdim, read_mesh
-from fenics_hytf.scene.motion import MotionInput, read_motions
+from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
+from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
 from fenics_hytf.scene.settings import (
     Effects,
     Lapses,
@@ -55,7 +55,7 @@ class Sections:
         mesh: ``[mesh]``.
         soil: ``[soil.NAME]`` by name, ``None`` for a soil with a fault.
         motion: ``[[motion]]``, read and scaled, ``None`` for a motion with a fault.
-        boundary: Kinds of the boundaries that the scene names.
+        boundary: What holds the boundaries that the scene names.
         lapses: ``[lapses]``.
         effects: ``[effects]``.
         points: ``[points]``.
@@ -69,7 +69,7 @@ class Sections:
     mesh: Mesh | None = None
     soil: dict[str, Soil | None] = field(default_factory=dict)
     motion: tuple[MotionInput | None, ...] = ()
-    boundary: dict[str, str] | None = None
+    boundary: Boundary | None = None
     lapses: Lapses | None = None
     effects: Effects | None = None
     points: Points | None = None
@@ -96,6 +96,9 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         sections, faults = _read_sections(raw, folder)
         faults += _unknown_sections(raw)
         faults += _soil_rules(raw, sections)
+        faults += _base_rules(sections)
+        faults += _antiplane_rules(raw)
+        faults += _calm_rules(raw, sections)
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
     order = {name: i for i, name in enumerate(SECTIONS)}
@@ -117,7 +120,9 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
     sections.soil, found = read_soils(raw.get("soil"))
     faults += found
     gdim, drawn = raw_gdim(raw.get("mesh")), layout(raw.get("mesh"))
-    sections.motion, found = read_motions(raw.get("motion"), folder, gdim)
+    sections.motion, found = read_motions(
+        raw.get("motion"), folder, raw_components(raw.get("mesh"))
+    )
     faults += found
     names = None if drawn is None else drawn.boundaries
     tables = [table for table in as_list(raw.get("motion")) if isinstance(table, dict)]
@@ -166,6 +171,38 @@ def _named_soils(mesh: dict[str, Any]) -> Iterator[tuple[str, str]]:
             name = part.get("soil") if isinstance(part, dict) else None
             if isinstance(name, str) and name:
                 yield join_key("mesh", place, i, "soil"), name
+
+
+def _base_rules(sections: Sections) -> Iterator[Fault]:
+    """The base and the kind of the motions fit each other."""
+    if sections.boundary is not None:
+        base = sections.boundary.kinds.get("base", default_kind("base"))
+        yield from input_rules(sections.motion, base)
+
+
+def _calm_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
+    """An absorbing layer lies along sides that there are."""
+    drawn = layout(raw.get("mesh"))
+    calm = sections.effects.calm if sections.effects is not None else None
+    if calm is None:
+        return
+    names = drawn.boundaries if drawn is not None else None
+    for i, side in enumerate(calm.sides):
+        where = join_key("effects.calm.sides", i)
+        if side in ("base", "top") or (names is not None and side not in names):
+            sides = [name for name in names or () if name not in ("base", "top")]
+            yield Fault(where, toml_text(side), ", ".join(sides) or "a side")
+
+
+def _antiplane_rules(raw: dict[str, Any]) -> Iterator[Fault]:
+    """A section that moves across its plane stays in it."""
+    mesh, effects = raw.get("mesh"), raw.get("effects")
+    if not (isinstance(mesh, dict) and mesh.get("kinematics") == "antiplane"):
+        return
+    for name in ("convection", "geometric_stiffness"):
+        if isinstance(effects, dict) and effects.get(name):
+            expected = "nothing: antiplane motion leaves the points where they are in the section"
+            yield Fault(f"effects.{name}", toml_text(effects[name]), expected)
 
 
 def _time_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:

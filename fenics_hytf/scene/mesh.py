@@ -34,6 +34,7 @@ BOUNDARIES = {
     2: ("base", "top", "left", "right"),
     3: ("base", "top", "left", "right", "front", "back"),
 }
+AXES = ("x", "y", "z")
 _MOST_CELLS = 1_000_000  # along one direction; more is a slip of the pen
 _MOST_CHECKED = 10_000_000  # cells of a box whose regions are checked here
 _CHECKED_AT_ONCE = 1_000_000
@@ -129,7 +130,8 @@ class Mesh(Table):
         file: Mesh file, absolute path.
         regions: Which soil is where in a box.
         degree: Degree of the displacement, 1 or 2.
-        kinematics: ``plane_strain`` in 2D, ``None`` in 3D and for a file that leaves it open.
+        kinematics: ``plane_strain`` or ``antiplane`` (SH: motion across the plane, ``z``) in 2D,
+            ``None`` in 3D and for a file that leaves it open.
         points_per_cell: Material points a cell, ``n**gdim`` for the Gauss rule with ``n`` points
             a direction; ``None`` for ``n = degree + 1``. Triangles and tetrahedra have rules of
             other sizes: by default, and for ``(degree + 1)**gdim``, the one that is exact to
@@ -141,15 +143,14 @@ class Mesh(Table):
     file: Path | None = Field(None, description="the path of a mesh file")
     regions: Several[Region] = Field((), description="an array of tables with soil and a place")
     degree: Literal[1, 2] = Field(1, description="1 or 2")
-    kinematics: Literal["plane_strain"] | None = Field(None, description='"plane_strain"')
+    kinematics: Literal["plane_strain", "antiplane"] | None = Field(
+        None, description='"plane_strain" or "antiplane"'
+    )
     points_per_cell: Count | None = Field(
         None, description="a whole number that the cells have a quadrature rule for"
     )
 
     later: ClassVar[Mapping[str, str]] = {"empty": "every region needs a soil"}
-    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "kinematics": {"antiplane": '"plane_strain" is'}
-    }
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -294,6 +295,28 @@ def raw_gdim(raw: object) -> int | None:
     box = raw.get("box")
     size = box.get("size") if isinstance(box, dict) else None
     return len(size) if isinstance(size, list | tuple) and len(size) in CELLS else None
+
+
+def components_of(gdim: int, kinematics: str | None) -> tuple[str, ...]:
+    """Names of the displacement components: across a section under antiplane kinematics.
+
+    Args:
+        gdim: Dimension of the mesh.
+        kinematics: Of the section, or ``None``.
+
+    Returns:
+        ``("x", "y")``, ``("z",)``, or all three in 3D.
+    """
+    return ("z",) if gdim == 2 and kinematics == "antiplane" else AXES[:gdim]
+
+
+def raw_components(raw: object) -> tuple[str, ...] | None:
+    """The displacement components of a raw ``[mesh]`` table, or ``None`` where they are open."""
+    gdim = raw_gdim(raw)
+    if gdim is None or not isinstance(raw, dict):
+        return None
+    kinematics = raw.get("kinematics")
+    return components_of(gdim, kinematics if isinstance(kinematics, str) else None)
 
 
 def _points_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:

@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
 from fenics_hytf import motion as records
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import is_file
+from fenics_hytf.scene.mesh import AXES, is_file
 from fenics_hytf.scene.table import (
     Positive,
     Table,
@@ -68,7 +68,7 @@ class Harmonic(Table):
 class MotionTable(Table):
     """One ``[[motion]]`` as it stands in the file; see :class:`MotionInput`."""
 
-    direction: Literal["x", "y", "z"] = Field(description='"x", "y" or "z" (3D)')
+    direction: Literal["x", "y", "z"] = Field(description='"x", "y" or "z" (3D and antiplane)')
     file: str | None = Field(None, description="the path of an AT2 or CSV file")
     harmonic: Harmonic | None = Field(
         None, description="a table with amplitude, frequency, cycles and samples"
@@ -80,10 +80,6 @@ class MotionTable(Table):
     pga: Positive | None = Field(None, description="a positive peak acceleration [g]")
     scale: float | None = Field(None, description="a number other than 0 [-]")
     input: Literal["within", "outcrop"] = Field("within", description='"within" or "outcrop"')
-
-    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "input": {"outcrop": 'outcrop motions need a compliant base; "within" on a rigid base is'}
-    }
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -100,14 +96,14 @@ class MotionTable(Table):
 
 
 def read_motions(
-    raw: object, folder: Path, gdim: int | None, key: str = "motion"
+    raw: object, folder: Path, components: tuple[str, ...] | None, key: str = "motion"
 ) -> tuple[tuple[MotionInput | None, ...], list[Fault]]:
     """Read all motions.
 
     Args:
         raw: What stands in the file, an array of tables.
         folder: Where relative paths start.
-        gdim: Dimension of the mesh, or ``None`` where only the mesh file knows.
+        components: Displacement components, or ``None`` where only the mesh file knows them.
         key: Where it stands.
 
     Returns:
@@ -124,8 +120,8 @@ def read_motions(
         motion, found = _read_motion(table, folder, where)
         faults += found
         direction = table.get("direction") if isinstance(table, dict) else None
-        if direction == "z" and gdim == 2:
-            faults.append(Fault(join_key(where, "direction"), '"z"', '"x" or "y": the mesh is 2D'))
+        if components is not None and direction in AXES and direction not in components:
+            faults.append(direction_fault(join_key(where, "direction"), direction, components))
         if isinstance(direction, str) and direction in first:
             expected = f"each direction once; {key}[{first[direction]}] has it"
             faults.append(Fault(join_key(where, "direction"), toml_text(direction), expected))
@@ -140,6 +136,38 @@ def read_motions(
         if abs(dt - dt0) > 1e-9 * dt0:
             faults.append(Fault(where, f"a time step of {dt:g} s", f"{dt0:g} s, as before"))
     return tuple(motions), faults
+
+
+def direction_fault(key: str, direction: str, components: tuple[str, ...]) -> Fault:
+    """The fault of a motion along an axis that the mesh does not move in."""
+    names = " or ".join(f'"{name}"' for name in components)
+    kinds = {1: "an antiplane section", 2: "a section in plane strain", 3: "a solid"}
+    return Fault(key, f'"{direction}"', f"{names}: the mesh is {kinds[len(components)]}")
+
+
+def input_rules(
+    motions: tuple[MotionInput | None, ...], base: str, key: str = "motion"
+) -> Iterator[Fault]:
+    """Outcrop motions come up through a compliant base; all motions are of one kind.
+
+    Args:
+        motions: The motions that could be read.
+        base: Kind of the base.
+        key: Where they stand.
+
+    Yields:
+        The faults.
+    """
+    read = [(join_key(key, i, "input"), m.input) for i, m in enumerate(motions) if m is not None]
+    for where, kind in read:
+        if kind == "outcrop" and base != "compliant":
+            expected = (
+                '"within" on a rigid base; or boundary.base = { compliant = ... } with the '
+                "properties of the rock"
+            )
+            yield Fault(where, f'"outcrop" on a base that is {base}', expected)
+        elif kind != read[0][1]:
+            yield Fault(where, f'"{kind}"', f'"{read[0][1]}", as the first motion is')
 
 
 def _read_motion(raw: object, folder: Path, key: str) -> tuple[MotionInput | None, list[Fault]]:

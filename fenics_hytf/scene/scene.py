@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf import motion as records
+from fenics_hytf.scene.boundary import Boundary
 from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.mesh import Mesh
@@ -37,7 +38,7 @@ class Scene:
         mesh: Mesh and discretisation.
         soil: Soils by name.
         motion: Motions of the base, one a direction, read and scaled.
-        boundary: Kinds of the boundaries that the scene names.
+        boundary: What holds the boundaries that the scene names.
         lapses: How the motion is cut.
         effects: What the scene calls for.
         points: Material points.
@@ -51,7 +52,7 @@ class Scene:
     mesh: Mesh
     soil: dict[str, Soil]
     motion: tuple[MotionInput, ...]
-    boundary: dict[str, str]
+    boundary: Boundary
     lapses: Lapses
     effects: Effects
     points: Points
@@ -146,6 +147,16 @@ class Scene:
     def directions(self) -> tuple[str, ...]:
         """Direction of each motion."""
         return tuple(motion.direction for motion in self.motion)
+
+    @property
+    def input(self) -> str:
+        """Kind of all motions: ``within`` or ``outcrop``."""
+        return self.motion[0].input
+
+    @property
+    def supports(self) -> dict[str, str]:
+        """What holds each boundary that the scene names under its motions."""
+        return self.boundary.supports(self.input)
 
     @property
     def dt(self) -> float:

@@ -12,6 +12,7 @@ from pydantic import Field
 from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
 from fenics_hytf.scene.table import (
     Count,
+    Name,
     NotNegative,
     Positive,
     Several,
@@ -101,7 +102,24 @@ class Rayleigh(Table):
     beta: NotNegative = Field(0.0, description="a number not below 0 [s]")
 
 
-_THIS_EFFECTS = "equivalent_linear, rayleigh, geometric_stiffness and convection are"
+class Calm(Table):
+    """A layer along some sides whose damping grows outwards and swallows waves.
+
+    The Caughey absorbing layer of Semblat, Lenti and Gandomzadeh (2011), with hysteretic damping:
+    ``damping·(1 − distance/thickness)²`` is added to the damping ratio of the soil.
+
+    Attributes:
+        sides: Names of vertical sides.
+        thickness: Of the layer [m].
+        damping: Damping ratio added at the side [-].
+    """
+
+    sides: Several[Name] = Field(min_length=1, description="names of sides")
+    thickness: Positive = Field(description="a positive thickness [m]")
+    damping: Positive = Field(0.5, description="a positive damping ratio [-]")
+
+
+_THIS_EFFECTS = "equivalent_linear, rayleigh, geometric_stiffness, convection and calm are"
 
 
 class Effects(Table):
@@ -112,15 +130,17 @@ class Effects(Table):
         rayleigh: Its factors, or ``None``.
         geometric_stiffness: Stiffness from the stress that the points carry.
         convection: Points move between lapses.
+        calm: The absorbing layer, or ``None``.
     """
 
     equivalent_linear: EquivalentLinear | None = Field(None, description="a table, true or false")
     rayleigh: Rayleigh | None = Field(None, description="a table with alpha and beta, or false")
     geometric_stiffness: bool = Field(False, description="true or false")
     convection: bool = Field(False, description="true or false")
+    calm: Calm | None = Field(None, description="a table with sides, thickness and damping")
 
     later: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("gravity", "sliding", "softening", "degradation", "locking", "calm", "k0"), _THIS_EFFECTS
+        ("gravity", "sliding", "softening", "degradation", "locking", "k0"), _THIS_EFFECTS
     )
 
     @classmethod
@@ -144,6 +164,8 @@ class Effects(Table):
             if (isinstance(rayleigh, dict) and set(rayleigh) <= set(Rayleigh.model_fields))
             else None
         )
+        if raw.get("calm") is False:
+            raw["calm"] = None
         if rayleigh is False or (factors and all(_is_zero(f) for f in factors)):
             raw["rayleigh"] = None
         return raw

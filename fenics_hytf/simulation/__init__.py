@@ -3,7 +3,7 @@
 
 from fenics_hytf.simulation.check import mesh_faults
 from fenics_hytf.simulation.errors import SimulationError
-from fenics_hytf.simulation.flow import seed_points, simulate
+from fenics_hytf.simulation.flow import simulate
 from fenics_hytf.simulation.inspection import Inspection, inspect
 from fenics_hytf.simulation.records import (
     Progress,
@@ -25,6 +25,5 @@ __all__ = [
     "Work",
     "inspect",
     "mesh_faults",
-    "seed_points",
     "simulate",
 ]

@@ -67,8 +67,9 @@ def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
     """What keeps the constraints from being built."""
     motions = [m for m in scene.motion if m is not None and m.direction in domain.components]
     axes = [domain.components.index(m.direction) for m in motions]
+    supports = scene.boundary.supports(motions[0].input) if scene.boundary and motions else {}
     try:
-        constraint_matrix(domain, scene.boundary or {}, axes).destroy()
+        constraint_matrix(domain, supports, axes).destroy()
     except SceneError as error:
         return error.faults
     return []

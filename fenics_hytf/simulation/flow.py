@@ -12,13 +12,13 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fenics_hytf import _compat
-from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import SweepError
 from fenics_hytf.lapse import (
+    BaseProbe,
     CellProbe,
     CellState,
     Equations,
+    FreeField,
     Ground,
     LapseError,
     LapseResult,
@@ -29,15 +29,13 @@ from fenics_hytf.lapse import (
     convect,
     excite,
     first_strain,
+    outcrop_motion,
+    seed_points,
     solve,
     survey,
+    within_motion,
 )
-from fenics_hytf.particles import (
-    Points,
-    PointsNotFinite,
-    PointsOutside,
-    seed,
-)
+from fenics_hytf.particles import PointsNotFinite, PointsOutside
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.clock import Clock
@@ -54,6 +52,7 @@ from fenics_hytf.simulation.snapshots import take_snapshot
 from fenics_hytf.soil import complex_factor
 
 RealArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 logger = logging.getLogger(__name__)
 
@@ -123,7 +122,7 @@ class _Run:
         self._strain_from = strain_from
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
-        self._owned: list[Equations | CellProbe] = []
+        self._owned: list[Equations | CellProbe | BaseProbe | FreeField] = []
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -132,14 +131,25 @@ class _Run:
             self.domain = checked_domain(scene, self.comm)
             self.points = seed_points(scene, self.domain)
             self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
-            self.equations = Equations(scene, self.domain, self._assemblies)
+            self.free_fields = self._level_ground()
+            self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
             self._owned.append(self.equations)
             loop = scene.effects.equivalent_linear
             self._probe = CellProbe(
                 self.domain, self.equations.T, loop.strain if loop is not None else "plane"
             )
-            self._owned.append(self._probe)
+            self._base = BaseProbe(self.domain, self.equations)
+            self._owned += [self._probe, self._base]
         self._ledger = self.points.ledger(self.comm)
+
+    def _level_ground(self) -> list[FreeField]:
+        """A column beyond each side with free field."""
+        columns = []
+        for name, kind in self.scene.boundary.kinds.items():
+            if kind == "free_field":
+                columns.append(FreeField(self.scene, self.domain, name, self._assemblies))
+                self._owned.append(columns[-1])
+        return columns
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
@@ -160,48 +170,47 @@ class _Run:
         """Transfer functions (5) of the lapse, with moduli that fit its strain."""
         assert self._ground is not None
         excitation = excite(self.scene, acceleration, self.equations.axes)
+        observer = self._observer(index)
+        for column in self.free_fields:
+            self._count(column.solve(excitation, observer))
+        start = self._effective_strain  # of the lapse before
         solved = solve(
             self.scene,
             self.equations,
             self._ground,
             excitation,
             self._probe,
-            self._first_strain(),
-            self._observer(index),
+            first_strain(self.scene, self._ground) if start is None else start,
+            observer,
             self._strain_from,
         )
         self._effective_strain = solved.effective_strain
-        self._work.factorisations += solved.tally.factorisations
-        self._work.solves += solved.tally.solves
+        self._count(solved)
         self._work.excited_lines += excitation.excited
         return solved
 
-    def _first_strain(self) -> RealArray:
-        """Warm start from the lapse before, else PGV/Vs."""
-        assert self._ground is not None
-        loop = self.scene.effects.equivalent_linear
-        if loop is None:
-            return np.zeros(self.domain.num_cells)
-        if self._effective_strain is not None:
-            return self._effective_strain
-        density = np.array([self.scene.soil[name].density for name in self.domain.region_names])
-        velocity = max(float(np.abs(m.record.velocity()).max()) for m in self.scene.motion)
-        return first_strain(self._ground, density[self._ground.region], velocity, loop.strain_ratio)
+    def _count(self, solved: Solved) -> None:
+        self._work.factorisations += solved.tally.factorisations
+        self._work.solves += solved.tally.solves
 
     def observe(self, solved: Solved, index: int, start: int) -> None:
         """Response of receivers and cells: û(ω) = h(ω) ü̂_b(ω) (6)."""
         assert self._ground is not None
         excitation = solved.excitation
         with self.clock.phase("response"):
+            base = self._base_motion = self._base.mean(solved.sweep, excitation)
             sites, numbers = self.receivers.sites(self.points)
             probe = ReceiverProbe(
                 self.domain, self.equations.T, sites, numbers, len(self.receivers.names)
             )
             try:
-                histories = probe.histories(solved.sweep, excitation)
+                histories = probe.histories(solved.sweep, excitation, base)
             finally:
                 probe.destroy()
-            cells = self._cell_state(solved)
+            cells = self._cell_state(solved, base)
+            outcrop = outcrop_motion(
+                self.scene, self.domain, self.equations, solved.sweep, excitation
+            )
             carried = self.receivers.carried(self.points)
         self.lapses.append(
             LapseResult(
@@ -221,21 +230,25 @@ class _Run:
                 velocity=histories.velocity,
                 acceleration=histories.acceleration,
                 total_acceleration=histories.total_acceleration,
+                within=within_motion(excitation, base),
+                outcrop=outcrop,
                 cells=cells,
                 ledger=self._ledger,
             )
         )
         self._report(index, "lapse", residual=self.lapses[-1].worst_residual)
 
-    def _cell_state(self, solved: Solved) -> CellState:
+    def _cell_state(self, solved: Solved, base: ComplexArray) -> CellState:
         assert self._ground is not None
         ground, moduli = self._ground, solved.moduli
         factor = complex_factor(moduli.damping, self.scene.solver.complex_modulus)
-        peaks = self._probe.peaks(solved.sweep, solved.excitation, moduli.shear_modulus * factor)
+        complex_modulus = moduli.shear_modulus * factor
+        peaks = self._probe.peaks(solved.sweep, solved.excitation, complex_modulus, base)
+        change = solved.loop.last
         effective = solved.effective_strain
         return CellState(
             region=ground.region,
-            centroid=self._centroids(),
+            centroid=self.domain.centroids(),
             shear_modulus=moduli.shear_modulus,
             g_over_gmax=moduli.shear_modulus / ground.shear_modulus,
             damping=moduli.damping,
@@ -243,37 +256,36 @@ class _Run:
             peak_strain=peaks.strain,
             peak_stress=peaks.stress,
             peak_acceleration=peaks.acceleration,
+            peak_velocity=peaks.velocity,
+            peak_displacement=peaks.displacement,
+            change=np.zeros(len(ground.region)) if change is None else change,
         )
-
-    def _centroids(self) -> RealArray:
-        mesh = self.domain.mesh
-        nodes = mesh.geometry.x[_compat.geometry_dofmap(mesh)[: self.domain.num_owned_cells]]
-        return self.domain.gather_cells(nodes.mean(axis=1)[:, : self.domain.gdim])
 
     def convect(self, solved: Solved) -> None:
         """Points take u(t_end) − u(t_start), move, and are found again by (7)-(9)."""
         if not self.scene.effects.convection:
             return
         with self.clock.phase("convection"):
-            excitation, sweep = solved.excitation, solved.sweep
-            duration = excitation.num_samples * excitation.dt
-
-            def field(time: float, derivative: int) -> RealArray:
-                weights = excitation.weights_at(time) * (1j * excitation.omega) ** derivative
-                return self.equations.expand(sweep.combine(weights))
-
+            end = solved.excitation.num_samples * solved.excitation.dt
             report = convect(
                 self.domain,
                 self.points,
-                field(duration, 0) - field(0.0, 0),
+                self._nodal_motion(solved, end) - self._nodal_motion(solved, 0.0),
                 self.scene.points.outside,
                 solved.constants,
-                field(duration, 1),
-                field(duration, 2),
+                self._nodal_motion(solved, end, derivative=1),
+                self._nodal_motion(solved, end, derivative=2),
             )
         self._ledger = report.ledger
         self._work.inverse_mappings += report.inverse_mappings
         self.lapses[-1] = replace(self.lapses[-1], ledger=report.ledger)
+
+    def _nodal_motion(self, solved: Solved, time: float, derivative: int = 0) -> RealArray:
+        """Displacement of the nodes relative to the base, or a time derivative of it."""
+        excitation = solved.excitation
+        weights = excitation.weights_at(time) * excitation.s**derivative
+        base = np.einsum("cmk,mk->c", self._base_motion, weights).real
+        return self.equations.expand(solved.sweep.combine(weights)) - base
 
     def show(self, solved: Solved, index: int, stop: int, snapshot: SnapshotCallback) -> None:
         """Hand points and fields to whoever writes them."""
@@ -283,8 +295,8 @@ class _Run:
                     self.scene,
                     self.domain,
                     self.points,
-                    self.equations,
-                    solved,
+                    lambda time: self._nodal_motion(solved, time),
+                    solved.moduli,
                     self.lapses[-1],
                     stop * self.scene.dt,
                 )
@@ -335,27 +347,3 @@ class _Run:
             work=self._work,
             peak_memory=comm.allreduce(memory, MPI.MAX),
         )
-
-
-def seed_points(scene: Scene, domain: Domain) -> Points:
-    """Fill the cells with points; only what an effect of the scene carries gets an array.
-
-    Args:
-        scene: The scene.
-        domain: The domain.
-
-    Returns:
-        The points of this rank.
-
-    Raises:
-        SceneError: The mesh's cells have no rule of so many points.
-    """
-    fields = []
-    if scene.effects.convection:
-        fields += ["velocity", "acceleration", "strain"]
-    if scene.effects.geometric_stiffness:
-        fields += ["stress"]
-    density = [scene.soil[name].density for name in domain.region_names]
-    cell_type = domain.mesh.topology.cell_name()
-    count = scene.mesh.points_in(cell_type)
-    return seed(domain.mesh, domain.regions, density, count, fields)

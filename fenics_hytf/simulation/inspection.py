@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from mpi4py import MPI
 
 from fenics_hytf.domain import constraint_matrix
-from fenics_hytf.lapse import excite
+from fenics_hytf.lapse import excite, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
-from fenics_hytf.simulation.flow import seed_points
 
 # Entries of an LDLᵀ factor a row, from nested dissection: 2D c n log2 n (measured 7.6 M entries on
 # 81 002 unknowns, so c = 5.8), 3D c n^(4/3) (PORD on 41 k unknowns, so c = 1).
@@ -66,7 +65,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     domain = checked_domain(scene, comm)
     points = seed_points(scene, domain)
     axes = tuple(domain.components.index(m.direction) for m in scene.motion)
-    T = constraint_matrix(domain, scene.boundary, axes)
+    T = constraint_matrix(domain, scene.supports, axes)
     unknowns = int(T.getSize()[1])
     T.destroy()
     lines = tuple(

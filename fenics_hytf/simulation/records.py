@@ -25,7 +25,7 @@ class Work:
         excited_lines: Excited lines, summed over lapses.
         inverse_mappings: Points whose reference coordinates were searched by Newton iteration.
         assemblies: Assemblies by the name of the form: ``elasticity``, ``geometric``, ``mass``,
-            ``rayleigh``. A form that a scene does not call for has no entry.
+            ``rayleigh``, ``dashpot``. A form that a scene does not call for has no entry.
         wall_s: Wall seconds by phase: ``setup``, ``assembly``, ``sweep``, ``response``,
             ``convection``, ``output``.
     """
@@ -143,3 +143,17 @@ class Result:
             The lapses joined sample for sample, shape ``(num_receivers, gdim, num_samples)``.
         """
         return np.concatenate([getattr(lapse, name) for lapse in self.lapses], axis=2)
+
+    @property
+    def within_acceleration(self) -> RealArray:
+        """Acceleration of the base over the whole record [m/s^2].
+
+        In the direction of each motion, shape ``(num_motions, num_samples)``.
+        """
+        return np.concatenate([lapse.within for lapse in self.lapses], axis=1)
+
+    @property
+    def outcrop_acceleration(self) -> RealArray | None:
+        """Acceleration of the bare rock likewise, or ``None`` where it is not known."""
+        parts = [lapse.outcrop for lapse in self.lapses if lapse.outcrop is not None]
+        return np.concatenate(parts, axis=1) if len(parts) == len(self.lapses) else None

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import basix
 import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf import _compat
 from fenics_hytf.domain import Domain
-from fenics_hytf.lapse import Equations, LapseResult, Solved
+from fenics_hytf.lapse import LapseResult, Moduli
 from fenics_hytf.particles import Points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Snapshot
@@ -26,8 +28,8 @@ def take_snapshot(
     scene: Scene,
     domain: Domain,
     points: Points,
-    equations: Equations,
-    solved: Solved,
+    displacement: Callable[[float], npt.NDArray[np.float64]],
+    moduli: Moduli,
     lapse: LapseResult,
     time: float,
 ) -> Snapshot:
@@ -40,8 +42,9 @@ def take_snapshot(
         scene: The scene.
         domain: The domain.
         points: The points after the lapse.
-        equations: The equations, which expand unknowns to nodes.
-        solved: The lapse's solution.
+        displacement: Displacement of the local nodes at a time of the lapse [m], shape
+            ``(num_local_nodes, num_components)``.
+        moduli: Moduli of the lapse.
         lapse: The lapse's result.
         time: End of the lapse [s].
 
@@ -52,7 +55,7 @@ def take_snapshot(
     arrays["position"] = arrays.pop("x")
     cells = domain.input_cells[points.cell]
     arrays["cell"] = cells
-    arrays["shear_modulus"] = solved.moduli.shear_modulus[cells]
+    arrays["shear_modulus"] = moduli.shear_modulus[cells]
     del arrays["X"]
     gathered = domain.comm.gather(arrays)
     everyone = None
@@ -62,9 +65,7 @@ def take_snapshot(
         everyone = {name: values[order] for name, values in everyone.items()}
     if not scene.output.fields:
         return Snapshot(lapse.index, time, everyone)
-    instant = _instant_of_peak(lapse)
-    weights = solved.excitation.weights_at(instant)
-    u = equations.expand(solved.sweep.combine(weights))
+    u = displacement(_instant_of_peak(lapse))
     vertices, connectivity, values = _vertex_field(domain, u)
     state = lapse.cells
     return Snapshot(
@@ -109,10 +110,11 @@ def _vertex_field(
     corners = domain.gather_cells(numbers)
     places = domain.gather_cells(mesh.geometry.x[nodes][:, :, : domain.gdim])
     values = domain.gather_cells(u[dofs])
+    if domain.num_components == 1:  # across the section
+        values = np.pad(values, ((0, 0), (0, 0), (2, 0)))
     _, first, inverse = np.unique(corners, return_index=True, return_inverse=True)
-    gdim = domain.gdim
     return (
-        places.reshape(-1, gdim)[first],
+        places.reshape(-1, domain.gdim)[first],
         inverse.reshape(corners.shape).astype(np.int64),
-        values.reshape(-1, gdim)[first],
+        values.reshape(-1, values.shape[-1])[first],
     )

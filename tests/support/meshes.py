@@ -1,6 +1,7 @@
 """Mesh files made by gmsh's own Python interface, and scenes round a mesh."""
 
-from collections.abc import Iterator
+import runpy
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -18,6 +19,11 @@ def scene(mesh: dict, soils: tuple[str, ...] = ("clay", "sand"), **sections) -> 
     """A scene of a mesh section; any other section can be given."""
     usual = {"mesh": mesh, "soil": dict.fromkeys(soils, SOIL), "motion": [MOTION]}
     return Scene.from_dict(usual | sections)
+
+
+def mesh_script(name: str) -> Callable[..., Path]:
+    """The function of a script of the folder ``meshes``, which has the script's name."""
+    return runpy.run_path(str(Path(__file__).parents[2] / "meshes" / f"{name}.py"))[name]
 
 
 @contextmanager

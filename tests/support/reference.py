@@ -10,6 +10,7 @@ from fenics_hytf.scene import Scene
 
 DATA = Path(__file__).parents[1] / "data"
 SHARED = Path(__file__).parents[3] / "shared" / "reference" / "ground"
+PUBLISHED = SHARED.parent / "published"
 G0 = 9.80665
 
 
@@ -25,11 +26,40 @@ def load(name: str) -> dict:
 
 def motion(case: dict) -> dict:
     given = case["motion"]
+    table = {"direction": "x", "pga": given["pga_g"], "input": case.get("base_input", "within")}
     if given["kind"] == "synthetic":
         parameters = {k: v for k, v in given["parameters"].items() if k != "golden"}
-        return {"direction": "x", "synthetic": parameters, "pga": given["pga_g"]}
-    file = str(SHARED / "motions" / "NIS090.AT2")
-    return {"direction": "x", "file": file, "pga": given["pga_g"]}
+        return table | {"synthetic": parameters}
+    return table | {"file": str(SHARED / "motions" / "NIS090.AT2")}
+
+
+def rock(case: dict) -> dict:
+    """The compliant base of a case."""
+    half_space = case["profile"]["halfspace"]
+    return {
+        "density": half_space["density_kg_m3"],
+        "shear_wave_velocity": half_space["vs_m_s"],
+        "damping": half_space["damping"],
+        "poisson": 0.25,  # not used under shear
+    }
+
+
+def comb(path: Path, lines: np.ndarray, num_samples: int, dt: float) -> dict:
+    """A record that excites some lines alike, multiples of 1/(num_samples dt) Hz, and no other.
+
+    Args:
+        path: Where the CSV file is written.
+        lines: Their numbers; none is the last one of an even number of samples.
+        num_samples: Samples.
+        dt: Time step [s].
+
+    Returns:
+        A ``[[motion]]`` table without a direction.
+    """
+    spectrum = np.zeros(num_samples // 2 + 1)
+    spectrum[lines] = num_samples / len(lines)
+    np.savetxt(path, np.fft.irfft(spectrum, num_samples))
+    return {"file": str(path), "dt": dt, "units": "m/s2"}
 
 
 def column(
@@ -65,12 +95,13 @@ def column(
         layers.append({"thickness": thickness, "soil": name, "cells": count})
     height = sum(layer["thickness"] for layer in layers)
     effects = {"equivalent_linear": equivalent_linear} if equivalent_linear else {}
+    base = {"base": {"compliant": rock(case)}} if motion.get("input") == "outcrop" else {}
     return Scene.from_dict(
         {
             "mesh": {"column": {"width": 1.0, "layers": layers}, "degree": 2},
             "soil": soils,
             "motion": [motion],
-            "boundary": {"left": "tied", "right": "tied"},
+            "boundary": {"left": "tied", "right": "tied"} | base,
             "lapses": {"duration": duration},
             "effects": effects,
             "solver": {"complex_modulus": convention},

@@ -421,7 +421,7 @@ def test_every_unknown_boundary_and_axis_at_once(tmp_path):
     assert found == {
         "boundary.lft": "no such boundary in the mesh; base, right, left",
         "boundary.rigth": "no such boundary in the mesh; base, right, left",
-        "motion[0].direction": '"z"; x or y: the mesh has 2 dimensions',
+        "motion[0].direction": '"z"; "x" or "y": the mesh is a section in plane strain',
     }
 
 

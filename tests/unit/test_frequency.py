@@ -21,7 +21,7 @@ from fenics_hytf.frequency import (
     direct_sweep,
     hysteretic,
 )
-from fenics_hytf.lapse import ElasticConstants, Equations
+from fenics_hytf.lapse import ElasticConstants, Equations, survey
 from fenics_hytf.particles import default_points_per_cell, seed
 from fenics_hytf.scene import Scene
 
@@ -463,15 +463,17 @@ def test_stiffness_contrast_of_a_million(cell, damping, package, figure):
     equations = Equations(case, domain, Counter())
     soils = [case.soil[name] for name in domain.region_names]
     density = [soil.density for soil in soils]
-    equations.weigh(seed(domain.mesh, domain.regions, density, default_points_per_cell(cell, 1)))
+    points = seed(domain.mesh, domain.regions, density, default_points_per_cell(cell, 1))
+    equations.weigh(points)
     region = domain.gather_cells(domain.regions)
     shear = np.array([soil.elastic.shear_modulus for soil in soils])[region]
     lame = np.array([soil.elastic.lame_lambda for soil in soils])[region]
     imaginary = ElasticConstants(2 * damping * lame, 2 * damping * shear) if damping else None
-    lapse = equations.assemble(ElasticConstants(lame, shear), imaginary)
+    soil = survey(case, domain, points)
+    lapse = equations.assemble(soil, ElasticConstants(lame, shear), imaginary)
     lines = 2j * np.pi * np.array([0.0, 0.1, 0.7, 2.3, 9.1, 27.0, 50.0])
-    sweep = direct_sweep(lapse.system, lapse.sides, lines, tolerance=1e-9)
-    (b,) = lapse.sides
+    sweep = direct_sweep(lapse.system, lapse.loads, lines, tolerance=1e-9)
+    (b,) = lapse.loads
     A, x, left = lapse.system.create_matrix(), b.duplicate(), b.duplicate()
     worst = 0.0
     for k, s in enumerate(lines):

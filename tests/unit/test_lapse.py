@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Parts of a lapse: acceleration of the loop, strain measures, what is in a cell, the input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -27,7 +29,7 @@ from fenics_hytf.lapse import (
 from fenics_hytf.motion import to_time
 from fenics_hytf.particles import quadrature_rule, seed
 from fenics_hytf.particles.points import take
-from fenics_hytf.scene import EquivalentLinear
+from fenics_hytf.scene import EquivalentLinear, Scene
 from fenics_hytf.soil import Curve
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
@@ -89,7 +91,7 @@ def ground(*curves, cells=(0,)) -> Ground:
     """Cells of soils with given curves."""
     region = np.array(cells, np.int32)
     full = np.ones(len(region))
-    return Ground(region, GMAX * full, 0.3 * full, 0.02 * full, curves)
+    return Ground(region, 2000.0 * full, GMAX * full, 0.3 * full, 0.02 * full, curves)
 
 
 def settings(**changes) -> EquivalentLinear:
@@ -229,11 +231,18 @@ def test_cells_can_share_the_strain_of_another():
 
 
 def test_first_guess():
-    # ratio × PGV/Vs
-    soil = ground(None, cells=(0, 0))
-    density = np.array([2000.0, 500.0])
-    speed = np.sqrt(GMAX / density)
-    np.testing.assert_allclose(first_strain(soil, density, 0.3, 0.65), 0.65 * 0.3 / speed)
+    # ratio × PGV/Vs; nothing to guess without the loop
+    soil = replace(ground(None, cells=(0, 0)), density=np.array([2000.0, 500.0]))
+    curves = {"strain": list(STRAIN), "modulus": list(SOFTENING), "damping": list(RISING)}
+    loop = {"equivalent_linear": {"strain_ratio": 0.6}}
+    linear = scene({"box": {"size": [1.0, 1.0], "cells": [1, 1]}}, ("clay",))
+    given = Scene.from_dict(
+        linear.data | {"effects": loop, "soil": {"clay": SOIL | {"curves": curves}}}
+    )
+    velocity = abs(given.motion[0].record.velocity()).max()
+    expected = 0.6 * velocity / np.sqrt(GMAX / soil.density)
+    np.testing.assert_allclose(first_strain(given, soil), expected)
+    np.testing.assert_array_equal(first_strain(linear, soil), 0.0)
 
 
 # ---------------------------------------------------------------- strain measures
@@ -394,6 +403,7 @@ FACTORS = {
 }
 MIXED = Ground(
     np.zeros(3, np.int32),
+    np.full(3, 1800.0),
     np.array([50e6, 80e6, 20e6]),
     np.array([0.0, 0.3, 0.49]),
     np.zeros(3),
@@ -566,7 +576,9 @@ def test_peaks_of_a_uniform_field(cell):
     probe = CellProbe(domain, T, "plane")
     sweep = FieldSweep(fields)
     modulus = np.full(domain.num_cells, 20e6 * (1 + 0.3j))
-    peaks = probe.peaks(sweep, given, modulus)
+    base = np.zeros((gdim, 1, 1), complex)
+    base[0] = 0.5 * shear  # as if the base were half a metre up
+    peaks = probe.peaks(sweep, given, modulus, base)
     # Sampled sixteen times a cycle from known phases: the peak over the samples, not the crest.
     phase = 2 * np.pi * line * np.arange(N) / N
     peak = np.abs(amplitude * np.real(shear * np.exp(1j * phase))).max()
@@ -580,6 +592,9 @@ def test_peaks_of_a_uniform_field(cell):
         (1 - omega**2 * shear * heights[:, None]) * np.exp(1j * phase[None])
     )
     np.testing.assert_allclose(peaks.acceleration, np.abs(total).max(axis=1), rtol=1e-12)
+    moved = amplitude * (heights[:, None] - 0.5) * shear * np.exp(1j * phase[None])
+    for found, values in ((peaks.displacement, moved), (peaks.velocity, 1j * omega * moved)):
+        np.testing.assert_allclose(found, np.abs(values.real).max(axis=1), rtol=1e-11, atol=EPS)
     probe.destroy()
     T.destroy()
 
@@ -596,7 +611,8 @@ def test_at_rest_the_modulus_is_real():
     fields = (x @ np.array([[0, 1e-3], [0, 0]]).T).astype(complex).reshape(-1, 1, 1)
     given = Excitation(np.array([0]), np.array([[8.0 + 0j]]), (0,), 8, 0.1, 1)
     probe = CellProbe(domain, T, "plane")
-    peaks = probe.peaks(FieldSweep(fields), given, np.array([1e6 * (1 + 0.5j)]))
+    modulus, base = np.array([1e6 * (1 + 0.5j)]), np.zeros((2, 1, 1), complex)
+    peaks = probe.peaks(FieldSweep(fields), given, modulus, base)
     assert peaks.stress[0] == pytest.approx(1e3, rel=1e-12)
     probe.destroy()
     T.destroy()

@@ -347,7 +347,7 @@ def test_rows_reproduce_polynomials(cell, degree):
     u = value(domain.V.tabulate_dof_coordinates()[:, :gdim]).ravel()
     place = displacement_rows(transfer_matrix(points, domain.V), gdim)
     np.testing.assert_allclose((place @ u).reshape(-1, gdim), value(points.x), atol=ROUND_OFF)
-    strain = strain_rows(gradient_matrices(points, domain.V))
+    strain = strain_rows(gradient_matrices(points, domain.V), domain.gdim)
     L = gradient(points.x)
     components = to_components((L + L.transpose(0, 2, 1)) / 2)
     components[:, gdim:] *= 2  # the points carry tensor components, rows engineering shear
@@ -363,7 +363,7 @@ def test_constrained_rows_are_the_product_with_t(cell):
     gdim = domain.gdim
     T = constraint_matrix(domain, {"left": "tied", "right": "tied"})
     points = seed(domain.mesh, domain.regions, DENSITY, default_points_per_cell(cell, 1))
-    local = strain_rows(gradient_matrices(points, domain.V))
+    local = strain_rows(gradient_matrices(points, domain.V), domain.gdim)
     index_map = domain.V.dofmap.index_map
     count = index_map.size_local + index_map.num_ghosts
     numbers = index_map.local_to_global(np.arange(count))

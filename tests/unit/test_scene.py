@@ -78,7 +78,7 @@ def test_defaults():
     s = scene(COLUMN)
     assert (s.mesh.degree, s.mesh.kinematics, s.mesh.points_per_cell) == (1, "plane_strain", None)
     assert s.mesh.points_in("quadrilateral") == 4
-    assert s.boundary == {}
+    assert s.boundary.kinds == {} and s.boundary.rock is None
     assert (s.lapses.count, s.lapses.duration, s.lapses.continuity) == (1, None, "steady")
     assert s.effects.named == ()
     assert s.effects.equivalent_linear is None and s.effects.rayleigh is None
@@ -425,4 +425,4 @@ def test_mesh_file(tmp_path):
     s = scene(text, extra, tmp_path)
     assert s.mesh.file == tmp_path / "m.msh"
     assert s.mesh.gdim is None and s.mesh.size is None and s.mesh.kinematics is None
-    assert s.boundary == {"sea": "free"}  # whether it is there, the mesh file knows
+    assert s.boundary.kinds == {"sea": "free"}  # whether it is there, the mesh file knows

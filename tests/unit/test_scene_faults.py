@@ -156,7 +156,7 @@ def test_the_scene_itself_is_good():
         ({"motion__0__pga": -1}, "motion[0].pga", "-1", "[g]"),
         ({"motion__0__pga": 0.1, "motion__0__harmonic__amplitude": 0}, "motion[0].pga",
          "zero acceleration", "a peak"),
-        ({"motion__0__direction": "z"}, "motion[0].direction", '"z"', "2D"),
+        ({"motion__0__direction": "z"}, "motion[0].direction", '"z"', "plane strain"),
         ({"motion__0__direction": "up"}, "motion[0].direction", '"up"', '"x", "y"'),
         ({"motion__0__direction": "y"}, "motion[1].direction", '"y"', "motion[0] has it"),
         ({"motion__0__dt": 0.1}, "motion[0].dt", "0.1", "nothing without file"),
@@ -217,19 +217,14 @@ def test_receiver_names_that_are_no_column(name):
 @pytest.mark.parametrize(
     ("values", "key"),
     [
-        ({"mesh__kinematics": "antiplane"}, "mesh.kinematics"),
         ({"mesh__empty": ["air"]}, "mesh.empty"),
-        ({"motion__0__input": "outcrop"}, "motion[0].input"),
-        ({"boundary__top": "dashpot"}, "boundary.top"),
-        ({"boundary__top": "free_field"}, "boundary.top"),
-        ({"boundary__base": {"compliant": {"density": 1}}}, "boundary.base"),
         ({"lapses__continuity": "transient"}, "lapses.continuity"),
         ({"solver__sweep": "reduced"}, "solver.sweep"),
         ({"solver__complex_modulus": "maxwell"}, "solver.complex_modulus"),
         ({"solver__reference_frequency": 2.0}, "solver.reference_frequency"),
         *(
             ({f"effects__{name}": value}, f"effects.{name}")
-            for name in ("gravity", "sliding", "softening", "degradation", "locking", "calm", "k0")
+            for name in ("gravity", "sliding", "softening", "degradation", "locking", "k0")
             for value in (True, {"a": 1})
         ),
     ],

@@ -62,17 +62,17 @@ def test_a_form_that_is_not_called_for_is_never_compiled(effect, monkeypatch):
 
 
 def test_points_carry_only_what_an_effect_needs():
-    from fenics_hytf.simulation import flow
+    from fenics_hytf.lapse import ground
 
     seen = []
-    original = flow.seed
+    original = ground.seed
 
     def spy(*arguments):
         seen.append(original(*arguments))
         return seen[-1]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(flow, "seed", spy)
+        patch.setattr(ground, "seed", spy)
         simulate(scene())
         simulate(scene(effects={"convection": True, "geometric_stiffness": True}))
     assert set(seen[0].history) == set()
