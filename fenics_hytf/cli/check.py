@@ -3,35 +3,73 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import typer
 from mpi4py import MPI
 
-from fenics_hytf.cli.collective import load_scene
+from fenics_hytf.cli.collective import at_root, load_scene
 from fenics_hytf.cli.outcome import DONE, InputError, RunRequest
+from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import Inspection, inspect
 
 
-def check_scene(request: RunRequest, comm: MPI.Comm) -> int:
+def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -> int:
     """Check a scene and say what it takes (collective).
 
     Args:
         request: What was asked for.
         comm: Communicator.
+        plot: PNG file for the figure of the soils' curves, or ``None``.
 
     Returns:
         The exit code.
 
     Raises:
-        InputError: With every fault of the scene.
+        InputError: With every fault of the scene and of the file; nothing is written then.
         SceneError: A fault that only the mesh shows.
+        WriteError: If the figure could not be written.
     """
     scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
-    if scene is None:
+    if plot is not None:
+        faults += comm.bcast(at_root(comm, lambda: figure_faults(plot)))
+    if scene is None or faults:
         raise InputError(faults)
     inspection = inspect(scene, comm)
     if comm.rank == 0:
         typer.echo(describe(inspection))
+    if plot is not None:
+        drawn = at_root(comm, lambda: draw(scene, plot))
+        if drawn is not None:
+            typer.echo(f"  {'curves':15s} {drawn}")
     return DONE
+
+
+def figure_faults(path: Path) -> list[str]:
+    """What speaks against writing a figure to a file; touches nothing."""
+    folder = path.parent
+    if path.suffix.lower() != ".png":
+        return [f"--plot: found {path}; expected a file that ends in .png"]
+    if not folder.is_dir():
+        return [f"--plot: found no folder {folder}; expected one that is there"]
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return [f"--plot: found that {folder} may not be written; expected write permission"]
+    if path.is_dir():
+        return [f"--plot: found the folder {path}; expected a file"]
+    return []
+
+
+def draw(scene: Scene, path: Path) -> str:
+    """Draw the curves of the scene's soils; say where, or that there are none."""
+    count = sum(soil.curve is not None for soil in scene.soil.values())
+    if not count:
+        return "no soil has any, no figure"
+    # matplotlib takes half a second to load; a check without figure does without
+    from fenics_hytf.results.curves import draw_curves
+
+    draw_curves(scene.soil, path)
+    return f"{path} ({count} soil{'s' if count > 1 else ''})"
 
 
 def describe(inspection: Inspection) -> str:

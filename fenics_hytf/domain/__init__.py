@@ -2,7 +2,7 @@
 """The mesh with its named regions and boundaries, its checks, and the constraint matrix T."""
 
 from fenics_hytf.domain.checks import jacobian_determinants, refuse_inverted_cells
-from fenics_hytf.domain.constraints import boundary_nodes, constraint_matrix
+from fenics_hytf.domain.constraints import boundary_nodes, constraint_matrix, normal_axis
 from fenics_hytf.domain.domain import Domain, build, examine, make_domain
 from fenics_hytf.domain.grids import MeshData
 from fenics_hytf.domain.side import SideColumn, distance_to_sides, side_column
@@ -18,6 +18,7 @@ __all__ = [
     "examine",
     "jacobian_determinants",
     "make_domain",
+    "normal_axis",
     "refuse_inverted_cells",
     "side_column",
 ]

@@ -15,9 +15,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-# Spring of a dashpot at rest over its impedance [rad/s]: costs four digits on common ground, and
-# changes nothing on a column.
-_SOFT = 1e-3
+# Spring of a dashpot at rest over its impedance [rad/s]: as stiff as a hundred metres of rock of
+# 1000 m/s and more, so about as stiff as a cell and well conditioned.
+_AT_REST = 100.0
 
 ScalarFunction = Callable[[complex], complex]
 
@@ -36,8 +36,8 @@ def radiation(factor: complex) -> ScalarFunction:
     """s·√(M*/M), of dashpots whose impedance ρV* is that of a damped material.
 
     Ground that stands on dashpots has no place of its own at s = 0, and A(0) would be singular.
-    There they become springs, so soft that they do not strain it: under a steady acceleration the
-    ground then moves as a whole, and its strain, all that is asked for, is right.
+    Rock does hold it at rest, so there they become springs. A level column under a steady
+    acceleration strains alike whatever their stiffness, for its base takes its weight either way.
 
     Args:
         factor: M*/M, complex over real modulus, at positive frequencies [-].
@@ -49,7 +49,7 @@ def radiation(factor: complex) -> ScalarFunction:
 
     def function(s: complex) -> complex:
         if s.imag == 0:
-            return s or _SOFT
+            return s or _AT_REST
         return s * (root if s.imag > 0 else root.conjugate())
 
     return function

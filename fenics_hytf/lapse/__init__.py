@@ -6,7 +6,7 @@ from fenics_hytf.lapse.convective import cell_stress, convect
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
 from fenics_hytf.lapse.errors import EmptyCellError, EquivalentLinearError, LapseError
-from fenics_hytf.lapse.free_field import FreeField
+from fenics_hytf.lapse.free_field import FreeField, column_supports
 from fenics_hytf.lapse.ground import (
     ElasticConstants,
     Ground,
@@ -49,6 +49,7 @@ __all__ = [
     "ReceiverProbe",
     "Solved",
     "cell_stress",
+    "column_supports",
     "complex_constants",
     "convect",
     "excite",

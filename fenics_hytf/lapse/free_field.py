@@ -13,6 +13,7 @@ moves as the column does. Sections do not act back on the columns.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -153,14 +154,27 @@ class FreeField:
         force.destroy()
 
 
+def column_supports(supports: Mapping[str, str], gdim: int) -> dict[str, str]:
+    """What holds a column of level ground: the base of the section, and tied sides.
+
+    Args:
+        supports: What holds the boundaries of the section.
+        gdim: Space dimension.
+
+    Returns:
+        Kind by name.
+    """
+    base = supports.get("base", default_kind("base"))
+    return {"base": base} | dict.fromkeys(_SIDES[: 2 * (gdim - 1)], "tied")
+
+
 def _level_ground(scene: Scene, gdim: int) -> Scene:
-    """The scene of a column of level ground: what holds its base, and tied sides."""
-    base = scene.boundary.kinds.get("base", default_kind("base"))
-    kinds = {"base": base} | dict.fromkeys(_SIDES[: 2 * (gdim - 1)], "tied")
+    """The scene of a column of level ground."""
+    kinds = MappingProxyType(column_supports(scene.boundary.kinds, gdim))
     still = {"convection": False, "geometric_stiffness": False, "calm": None}
     return replace(
         scene,
-        boundary=Boundary(MappingProxyType(kinds), scene.boundary.rock),
+        boundary=Boundary(kinds, scene.boundary.rock),
         effects=scene.effects.model_copy(update=still),
         mesh=scene.mesh.model_copy(update={"points_per_cell": None}),
     )

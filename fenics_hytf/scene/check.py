@@ -117,7 +117,7 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
         faults.append(Fault("title", toml_text(title), "a string"))
     sections.mesh, found = read_mesh(raw.get("mesh"), folder)
     faults += found
-    sections.soil, found = read_soils(raw.get("soil"))
+    sections.soil, found = read_soils(raw.get("soil"), folder=folder)
     faults += found
     gdim, drawn = raw_gdim(raw.get("mesh")), layout(raw.get("mesh"))
     sections.motion, found = read_motions(
@@ -240,7 +240,10 @@ def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     solver, effects = raw.get("solver"), raw.get("effects")
     if isinstance(solver, dict) and solver.get("complex_modulus") == "dormieux":
         for name, soil in soils.items():
-            yield from _dormieux(soil, join_key("soil", name_key(name)))
+            yield from _dormieux(soil, join_key("soil", name_key(name)), sections.folder)
+        base = raw["boundary"].get("base") if isinstance(raw.get("boundary"), dict) else None
+        if isinstance(base, dict):
+            yield from _dormieux(base.get("compliant"), "boundary.base.compliant", sections.folder)
     loop = effects.get("equivalent_linear", False) if isinstance(effects, dict) else False
     if loop is False or loop is None:
         return
@@ -253,7 +256,7 @@ def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
         yield Fault("effects.equivalent_linear", "no soil with curves", expected)
 
 
-def _dormieux(raw: object, key: str) -> Iterator[Fault]:
+def _dormieux(raw: object, key: str, folder: Path) -> Iterator[Fault]:
     """G(sqrt(1 - 4 D^2) + 2 i D) needs D below one half, of the curve at every strain."""
     if not isinstance(raw, dict):
         return
@@ -262,7 +265,7 @@ def _dormieux(raw: object, key: str) -> Iterator[Fault]:
     if damping is not None and 0.5 <= damping < 1:
         yield Fault(join_key(key, "damping"), toml_text(damping), f"a damping ratio {expected}")
     curves = raw.get("curves")
-    curve = read_curves(curves, "curves")[0] if isinstance(curves, dict) else None
+    curve = read_curves(curves, "curves", folder)[0] if isinstance(curves, dict) else None
     if curve is not None and float(curve.damping.max()) >= 0.5:
         found = f"damping up to {float(curve.damping.max()):g}"
         yield Fault(join_key(key, "curves"), found, f"damping ratios {expected}")

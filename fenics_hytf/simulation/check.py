@@ -3,9 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 from mpi4py import MPI
 
-from fenics_hytf.domain import Domain, constraint_matrix, examine
+from fenics_hytf.domain import Domain, constraint_matrix, examine, normal_axis, side_column
+from fenics_hytf.lapse import column_supports
 from fenics_hytf.scene import Fault, Scene, SceneError, Sections
 from fenics_hytf.simulation.receivers import receiver_faults
 
@@ -64,12 +68,27 @@ def checked_domain(scene: Scene, comm: MPI.Comm) -> Domain:
 
 
 def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
-    """What keeps the constraints from being built."""
+    """What keeps the constraints, the columns beyond sides or an absorbing layer from being."""
     motions = [m for m in scene.motion if m is not None and m.direction in domain.components]
     axes = [domain.components.index(m.direction) for m in motions]
     supports = scene.boundary.supports(motions[0].input) if scene.boundary and motions else {}
-    try:
-        constraint_matrix(domain, supports, axes).destroy()
-    except SceneError as error:
-        return error.faults
-    return []
+    calm = scene.effects.calm if scene.effects is not None else None
+    attempts: list[Callable[[], object]] = [
+        lambda: constraint_matrix(domain, supports, axes).destroy(),
+        *(partial(_try_column, domain, name, supports, axes) for name in supports),
+        *(partial(normal_axis, domain, name) for name in (calm.sides if calm else ())),
+    ]
+    faults: list[Fault] = []
+    for attempt in attempts:
+        try:
+            attempt()
+        except SceneError as error:
+            faults += error.faults
+    return faults
+
+
+def _try_column(domain: Domain, name: str, supports: dict[str, str], axes: list[int]) -> None:
+    """Make the column beyond a side with free field, and hold its base."""
+    if supports[name] == "free_field":
+        column = side_column(domain, name).domain
+        constraint_matrix(column, column_supports(supports, column.gdim), axes).destroy()

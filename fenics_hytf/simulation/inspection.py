@@ -31,8 +31,8 @@ class Inspection:
         lapses: Number of lapses.
         samples_per_lapse: Samples in each.
         lines: Lines solved in each lapse.
-        factorisations: Factorisations expected; with the equivalent-linear loop the most there
-            can be.
+        factorisations: Factorisations expected, those of free-field columns among them; with the
+            equivalent-linear loop the most there can be.
         memory_bytes: Estimated memory of all ranks [bytes].
         notes: What the user should know.
     """
@@ -74,6 +74,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     )
     loop = scene.effects.equivalent_linear
     iterations = 1 if loop is None else loop.max_iterations
+    columns = list(scene.boundary.kinds.values()).count("free_field")
     num_points = comm.allreduce(len(points))
     return Inspection(
         effects=scene.effects.named,
@@ -83,7 +84,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         lapses=len(lines),
         samples_per_lapse=scene.segments[0].num_samples,
         lines=lines,
-        factorisations=sum(lines) * iterations,
+        factorisations=sum(lines) * iterations * (1 + columns),
         memory_bytes=_memory(unknowns, domain.gdim, max(lines, default=0) * len(axes), comm.size)
         + num_points * points.bytes_per_point,
         notes=_notes(scene, lines),

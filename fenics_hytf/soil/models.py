@@ -3,24 +3,42 @@
 
 from __future__ import annotations
 
+import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from fenics_hytf.soil.curves import Curve
 from fenics_hytf.soil.darendeli import darendeli
+from fenics_hytf.soil.epri import EPRI_DEPTHS, epri_1993_pi
+from fenics_hytf.soil.hyperbolic import hardin_drnevich, mkz
+from fenics_hytf.soil.ishibashi_zhang import ishibashi_zhang
+from fenics_hytf.soil.menq import menq
 from fenics_hytf.soil.published import SEED_IDRISS_BOUNDS, seed_idriss_1970, vucetic_dobry_1991
+from fenics_hytf.soil.regional import REGIONAL
+from fenics_hytf.soil.shake91 import SHAKE91
 
 
 def _seed_idriss(bound: str) -> Callable[[], Curve]:
     return lambda: seed_idriss_1970(bound)
 
 
+def _fixed(curve: Curve) -> Callable[[], Curve]:
+    return lambda: curve
+
+
 CURVE_MODELS: Mapping[str, Callable[..., Curve]] = MappingProxyType(
     {
         "darendeli": darendeli,
+        "menq": menq,
+        "ishibashi_zhang": ishibashi_zhang,
+        "hardin_drnevich": hardin_drnevich,
+        "mkz": mkz,
         "vucetic_dobry_1991": vucetic_dobry_1991,
         **{f"seed_idriss_1970_{bound}": _seed_idriss(bound) for bound in SEED_IDRISS_BOUNDS},
+        "epri_1993_pi": epri_1993_pi,
+        **{f"epri_1993_{depth}": _fixed(curve) for depth, curve in EPRI_DEPTHS.items()},
+        **{name: _fixed(curve) for name, curve in (*SHAKE91.items(), *REGIONAL.items())},
     }
 )
 """Builder of each model, by name; what it takes are the model's parameters."""
@@ -41,8 +59,10 @@ def curve_from_model(model: str, **parameters: object) -> Curve:
             out of range.
     """
     if model not in CURVE_MODELS:
+        close = difflib.get_close_matches(model, CURVE_MODELS, n=1)
+        hint = f"; did you mean '{close[0]}'?" if close else ""
         raise ValueError(
-            f"curves.model: found {model!r}; expected one of {', '.join(CURVE_MODELS)}"
+            f"curves.model: found {model!r}; expected one of {', '.join(CURVE_MODELS)}{hint}"
         )
     builder = CURVE_MODELS[model]
     known = inspect.signature(builder).parameters

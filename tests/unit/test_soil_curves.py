@@ -9,6 +9,17 @@ from fenics_hytf.soil import CURVE_MODELS, Curve, curve_from_model, darendeli
 
 C = json.loads((Path(__file__).parents[1] / "data/c_darendeli24_synthetic_pga0p2.json").read_text())
 
+# parameters of the models that need some
+PARAMETERS = {
+    "darendeli": {"plasticity_index": 10.0, "mean_stress": 1e5},
+    "menq": {"uniformity_coefficient": 10.0, "d50": 5.0, "mean_stress": 1e5},
+    "ishibashi_zhang": {"plasticity_index": 10.0, "mean_stress": 1e5},
+    "hardin_drnevich": {"reference_strain": 4e-4, "max_damping": 0.25},
+    "mkz": {"reference_strain": 4e-4, "curvature": 0.9, "small_strain_damping": 0.01, "p1": 0.7},
+    "vucetic_dobry_1991": {"plasticity_index": 10.0},
+    "epri_1993_pi": {"plasticity_index": 20.0},
+}
+
 CURVE = Curve(np.array([1e-5, 1e-4, 1e-2]), np.array([1.0, 0.8, 0.1]), np.array([0.01, 0.03, 0.2]))
 
 
@@ -130,6 +141,17 @@ def test_darendeli_at_the_reference_strain():
     assert curve.damping[0] == pytest.approx(0.008005, rel=1e-5)
 
 
+@pytest.mark.parametrize("strain", [1e-16, 1e-12, 1e-9])
+def test_darendeli_at_vanishing_strain(strain):
+    # the formula as printed takes the difference of two numbers that agree to all digits there:
+    # at 1e-12 it gives a negative damping; D - D_min is c1 b (100/pi) (2/3) times the strain over
+    # the reference strain, 0.0352 %
+    damping = 100 * darendeli(0.0, 101325.0, strain=[strain, 1e-3]).damping[0]
+    c1 = -1.1143 * 0.919**2 + 1.8618 * 0.919 + 0.2523
+    slope = c1 * (0.6329 - 0.00566 * np.log(10)) * 100 / np.pi * 2 / 3
+    assert damping == pytest.approx(0.8005 + slope * strain / 0.000352, rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("arguments", "name"),
     [
@@ -152,24 +174,39 @@ def test_darendeli_invalid(arguments, name):
 def test_models_by_name():
     curve = curve_from_model("darendeli", plasticity_index=0, mean_stress=12e3, ocr=1)
     assert np.array_equal(curve.damping, darendeli(0, 12e3).damping)
-    assert set(CURVE_MODELS) == {
-        "darendeli",
-        "vucetic_dobry_1991",
-        "seed_idriss_1970_mean",
-        "seed_idriss_1970_upper",
-        "seed_idriss_1970_lower",
+    assert set(PARAMETERS) < set(CURVE_MODELS)
+    assert {name for name in CURVE_MODELS if name not in PARAMETERS} == {
+        *(f"seed_idriss_1970_{bound}" for bound in ("mean", "upper", "lower")),
+        *("epri_1993_0_20ft", "epri_1993_20_50ft", "epri_1993_50_120ft"),
+        *("epri_1993_120_250ft", "epri_1993_250_500ft", "epri_1993_500_1000ft"),
+        *("idriss_1990_clay", "idriss_1990_sand", "schnabel_1973_rock"),
+        *("gei_1983_0_50ft", "gei_1983_50_100ft", "gei_1983_100_250ft", "gei_1983_250_500ft"),
+        *("gei_1983_below_500ft", "geomatrix_1990_0_50ft", "geomatrix_1990_50_150ft"),
+        *("geomatrix_1990_150_300ft", "geomatrix_1990_below_300ft"),
+        *("imperial_valley_0_300ft", "imperial_valley_below_300ft"),
+        *("peninsular_range_0_50ft", "peninsular_range_50_500ft"),
     }
-    for name in CURVE_MODELS:
-        parameters = {"plasticity_index": 10.0, "mean_stress": 1e5} if name == "darendeli" else {}
-        if name == "vucetic_dobry_1991":
-            parameters = {"plasticity_index": 10.0}
-        assert isinstance(curve_from_model(name, **parameters), Curve)
+
+
+@pytest.mark.parametrize("name", CURVE_MODELS)
+def test_every_model_is_sensible_in_the_whole_range_of_strain(name):
+    curve = curve_from_model(name, **PARAMETERS.get(name, {}))
+    assert type(curve) is Curve
+    modulus, damping = curve.evaluate(np.logspace(-9.0, 1.0, 500))
+    # tables of measured soils begin near 1 and with a few per cent of damping at most, and lose
+    # most of their stiffness; rock keeps half of it and damps little
+    rock = name == "schnabel_1973_rock"
+    assert 0.98 <= modulus[0] <= 1.0 and modulus[-1] < (0.6 if rock else 0.4)
+    assert 0.0 <= damping[0] < 0.03 and (0.04 if rock else 0.09) < damping[-1] < 0.5
+    assert np.all(np.diff(modulus) <= 0.0) and np.all(modulus > 0.0)
+    assert damping.min() >= 0.0 and damping.max() < 0.5  # below 0.5: Dormieux's modulus takes it
 
 
 @pytest.mark.parametrize(
     ("model", "parameters", "message"),
     [
-        ("hardin", {}, "^curves.model: found 'hardin'; expected one of darendeli, vucetic_dobry"),
+        ("hardin", {}, "^curves.model: found 'hardin'; expected one of darendeli, menq, ishib"),
+        ("hardin_drnevic", {}, "peninsular_range_50_500ft; did you mean 'hardin_drnevich'"),
         ("darendeli", {"plasticity_index": 0}, "^curves: found no mean_stress"),
         ("darendeli", {}, "found no plasticity_index, mean_stress for the model 'darendeli'"),
         (
