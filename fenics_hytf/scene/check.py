@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.motion import split
-from fenics_hytf.scene.boundary import Boundary, default_kind, read_boundary
+from fenics_hytf.scene.boundary import BOUNDARY_KINDS, Boundary, default_kind, read_boundary
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
 from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
 from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
@@ -96,7 +96,7 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         sections, faults = _read_sections(raw, folder)
         faults += _unknown_sections(raw)
         faults += _soil_rules(raw, sections)
-        faults += _base_rules(sections)
+        faults += _base_rules(raw, sections)
         faults += _antiplane_rules(raw)
         faults += _calm_rules(raw, sections)
         faults += _time_rules(raw, sections)
@@ -173,10 +173,13 @@ def _named_soils(mesh: dict[str, Any]) -> Iterator[tuple[str, str]]:
                 yield join_key("mesh", place, i, "soil"), name
 
 
-def _base_rules(sections: Sections) -> Iterator[Fault]:
+def _base_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     """The base and the kind of the motions fit each other."""
-    if sections.boundary is not None:
-        base = sections.boundary.kinds.get("base", default_kind("base"))
+    boundary = raw.get("boundary", {})
+    base = boundary.get("base", default_kind("base")) if isinstance(boundary, dict) else None
+    if isinstance(base, dict) and "compliant" in base:
+        yield from input_rules(sections.motion, "compliant")
+    elif isinstance(base, str) and base in set(BOUNDARY_KINDS) - {"dashpot", "free_field"}:
         yield from input_rules(sections.motion, base)
 
 
