@@ -8,6 +8,7 @@ import re
 import sys
 import time
 from contextlib import redirect_stdout
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -50,6 +51,14 @@ SetOption = Annotated[
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace a finished result.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress, no summary.")]
 PlotsOption = Annotated[bool, typer.Option("--no-plots", help="No figures, no report.")]
+PlotOption = Annotated[
+    str | None,
+    typer.Option(
+        "--plot",
+        metavar="[FILE]",
+        help="Draw the curves of the soils, as PNG  [./<scene>-curves.png]",
+    ),
+]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Not in this version.")]
 GroupOption = Annotated[
     int | None, typer.Option("--group-size", metavar="K", help="Not in this version.")
@@ -62,7 +71,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     Args:
         arguments: What follows ``hytf``; the process's own if ``None``.
     """
-    given = spread_overrides(sys.argv[1:] if arguments is None else arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    given = fill_plot(spread_overrides(given))
     if launched_rank() == 0:
         app(given, prog_name="hytf")
         raise AssertionError("typer returns by SystemExit")
@@ -93,6 +103,15 @@ def spread_overrides(arguments: list[str]) -> list[str]:
             follows = argument == "--set"
         spread.append(argument)
     return spread
+
+
+def fill_plot(arguments: list[str]) -> list[str]:
+    """Let ``--plot`` stand without FILE: it takes the next word only if that ends in .png."""
+    following = [*arguments[1:], ""]
+    return [
+        "--plot=" if word == "--plot" and not re.fullmatch(r"(?i)[^-].*\.png", after) else word
+        for word, after in zip(arguments, following, strict=False)
+    ]
 
 
 @app.callback(invoke_without_command=True)
@@ -126,10 +145,16 @@ def run(
 
 
 @app.command()
-def check(scene: SceneArgument, motion: MotionOption = None, overrides: SetOption = None) -> None:
+def check(
+    scene: SceneArgument,
+    motion: MotionOption = None,
+    overrides: SetOption = None,
+    plot: PlotOption = None,
+) -> None:
     """Check a scene: its faults, or what running it would take."""
     request = RunRequest(scene, default_folder(scene), motion, tuple(overrides or ()))
-    _leave("check", request)
+    figure = None if plot is None else Path(plot or f"{scene.stem}-curves.png")
+    _leave("check", request, plot=figure)
 
 
 @app.command()
@@ -142,6 +167,40 @@ def plot(
     from fenics_hytf.cli.plot import plot_result
 
     raise typer.Exit(plot_result(folder))
+
+
+@app.command()
+def export(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished result.")],
+    receivers: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[RECEIVER]...", help="Receivers, within, outcrop; all if none is named."
+        ),
+    ] = None,
+    file_format: Annotated[
+        str, typer.Option("--format", metavar="at2|csv", help="Kind of the files.")
+    ] = "at2",
+    quantity: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME", help="total_acceleration, acceleration, velocity or displacement."
+        ),
+    ] = "total_acceleration",
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FOLDER", help="Where to  [./<DIR>-motions]"),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+) -> None:
+    """Write motions of a finished result as AT2 (in g) or CSV."""
+    if launched_rank() != 0:
+        return
+    from fenics_hytf.cli.export import ExportRequest, export_motions
+
+    names = tuple(dict.fromkeys(receivers or ()))
+    request = ExportRequest(folder, names, file_format, quantity, output, force)
+    raise typer.Exit(export_motions(request))
 
 
 @app.command()
@@ -194,7 +253,7 @@ def _refuse_later(resume: bool, group_size: int | None) -> None:
         raise typer.Exit(INPUT)
 
 
-def _leave(command: str, request: RunRequest) -> NoReturn:
+def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
     """Check the environment, run a command that solves, and leave with its exit code."""
     from fenics_hytf.cli.environment import environment_faults
 
@@ -205,4 +264,4 @@ def _leave(command: str, request: RunRequest) -> NoReturn:
     from fenics_hytf.cli import check, run
 
     commands: dict[str, Any] = {"run": run.run_scene, "check": check.check_scene}
-    raise typer.Exit(run.guarded(commands[command], request))
+    raise typer.Exit(run.guarded(partial(commands[command], **options), request))

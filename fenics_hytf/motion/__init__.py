@@ -1,30 +1,51 @@
 # SPDX-License-Identifier: MIT
-"""Ground motion: records, lapses, transforms and response spectra. Knows no mesh and no MPI."""
+"""Ground motion: records, lapses, transforms, spectra and intensity. Knows no mesh and no MPI."""
 
 from fenics_hytf.motion.formats import read, read_at2, read_csv
+from fenics_hytf.motion.fourier import fourier_amplitude, smoothed
+from fenics_hytf.motion.intensity import (
+    Intensity,
+    arias_intensity,
+    cumulative_absolute_velocity,
+    integrated,
+    intensity_measures,
+    significant_duration,
+)
 from fenics_hytf.motion.lapses import Segment, split
 from fenics_hytf.motion.records import GRAVITY, Record, RecordError
 from fenics_hytf.motion.response import default_periods, response_spectrum
 from fenics_hytf.motion.sources import harmonic, recorded, recorded_names, synthetic
 from fenics_hytf.motion.spectra import excited_lines, frequencies, to_frequency, to_time
+from fenics_hytf.motion.writers import write_at2, write_columns, write_csv
 
 __all__ = [
     "GRAVITY",
+    "Intensity",
     "Record",
     "RecordError",
     "Segment",
+    "arias_intensity",
+    "cumulative_absolute_velocity",
     "default_periods",
     "excited_lines",
+    "fourier_amplitude",
     "frequencies",
     "harmonic",
+    "integrated",
+    "intensity_measures",
     "read",
     "read_at2",
     "read_csv",
     "recorded",
     "recorded_names",
     "response_spectrum",
+    "significant_duration",
+    "smoothed",
     "split",
     "synthetic",
     "to_frequency",
     "to_time",
+    "write_at2",
+    "write_columns",
+    "write_csv",
 ]

@@ -148,6 +148,11 @@ def read_csv(path: str | PathLike[str], dt: float | None = None, units: str = "g
     return Record(UNITS[units] * values[:, -1], dt, Path(path).stem)
 
 
+def reads_as_header(line: str) -> bool:
+    """Whether a line of text would be taken for an AT2 header's units or number of samples."""
+    return any(pattern.search(line) for pattern in (_UNITS, *_HEADERS))
+
+
 def _lines(path: str | PathLike[str]) -> list[str]:
     """Lines of a text file."""
     try:

@@ -16,7 +16,13 @@ from fenics_hytf.results.folder import (
     open_result,
 )
 from fenics_hytf.results.publish import publish
-from fenics_hytf.results.reader import StoredResult, read_result, read_table
+from fenics_hytf.results.reader import (
+    StoredResult,
+    read_result,
+    read_summary,
+    read_table,
+    read_tables,
+)
 from fenics_hytf.results.summary import summarise
 
 __all__ = [
@@ -31,6 +37,8 @@ __all__ = [
     "open_result",
     "publish",
     "read_result",
+    "read_summary",
     "read_table",
+    "read_tables",
     "summarise",
 ]

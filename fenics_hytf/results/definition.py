@@ -4,12 +4,25 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import TYPE_CHECKING, Any
+
+from fenics_hytf.scene import default_kind
 
 if TYPE_CHECKING:
     from fenics_hytf.scene import Scene
     from fenics_hytf.scene.mesh import Mesh
     from fenics_hytf.scene.soil import Soil
+
+_MODEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:_(\d{4}))?(?:_(\w+))?")
+_ACRONYMS = ("epri", "gei", "mkz", "ocr")
+_UNITS = {
+    "plasticity_index": (1.0, " %"),
+    "mean_stress": (1e-3, " kPa"),
+    "shear_strength": (1e-3, " kPa"),
+    "d50": (1.0, " mm"),
+    "frequency": (1.0, " Hz"),
+}
 
 
 def describe_scene(scene: Scene) -> dict[str, Any]:
@@ -21,17 +34,23 @@ def describe_scene(scene: Scene) -> dict[str, Any]:
     Returns:
         Plain values.
     """
-    loop, rayleigh = scene.effects.equivalent_linear, scene.effects.rayleigh
-    solver = scene.solver
+    effects, solver, boundary = scene.effects, scene.solver, scene.boundary
+    loop = effects.equivalent_linear
+    names = scene.mesh.boundaries or tuple(dict.fromkeys(("base", *boundary.kinds)))
     return {
         "definition": json.loads(json.dumps(scene.data, default=str)),
         "mesh": _mesh(scene.mesh),
         "soils": {name: _soil(soil, loop is not None) for name, soil in scene.soil.items()},
-        "boundary": dict(scene.boundary),
+        "boundary": {name: boundary.kinds.get(name, default_kind(name)) for name in names},
+        "rock": None if boundary.rock is None else boundary.rock.model_dump(),
         "continuity": scene.lapses.continuity,
         "loop_tolerance": None if loop is None else loop.tolerance,
         "strain_ratio": None if loop is None else loop.strain_ratio,
-        "rayleigh": None if rayleigh is None else rayleigh.model_dump(),
+        "magnitude": None if loop is None else loop.magnitude,
+        "strain_measure": "plane" if loop is None else loop.strain,
+        "rayleigh": None if effects.rayleigh is None else effects.rayleigh.model_dump(),
+        "calm": None if effects.calm is None else effects.calm.model_dump(),
+        "water_table_m": scene.output.water_table,
         "solver": solver.model_dump(),
     }
 
@@ -73,13 +92,35 @@ def _soil(soil: Soil, with_curves: bool) -> dict[str, Any]:
 
 
 def _curves(soil: Soil) -> str | None:
+    """Which curves, with their parameters; a table by the number of its strains."""
     if soil.curves is None:
         return None
-    parameters = [
-        f"{key} {value:g}" if isinstance(value, float | int) else f"{key} {value}"
-        for key, value in soil.curves.items()
-        if key != "model"
-    ]
-    if "model" not in soil.curves:
-        return f"table of {len(soil.curves['strain'])} strains"
-    return ", ".join([str(soil.curves["model"]), *parameters]).replace("_", " ")
+    curves = dict(soil.curves)
+    parts = []
+    if "model" in curves:
+        parts.append(_model(str(curves.pop("model"))))
+    for columns in ("strain", "modulus", "damping"):
+        values = curves.pop(columns, None)
+        if columns == "strain" and values is not None:
+            parts.append(f"table of {len(values)} strains")
+    return ", ".join([*parts, *(_parameter(*item) for item in curves.items())])
+
+
+def _model(name: str) -> str:
+    """The name of a model: its authors or region, year, and what follows."""
+    match = _MODEL.fullmatch(name)
+    if match is None:
+        return name.replace("_", " ")
+    words, year, rest = match.groups()
+    who = " ".join(w.upper() if w in _ACRONYMS else w.capitalize() for w in words.split("_"))
+    which = "" if rest is None else f", {rest.replace('_', ' ')}"
+    return who + ("" if year is None else f" ({year})") + which
+
+
+def _parameter(name: str, value: object) -> str:
+    """A parameter of curves with its unit; stresses, which the scene gives in Pa, as kPa."""
+    words = name.upper() if name in _ACRONYMS else name.replace("_", " ")
+    if not isinstance(value, float | int):
+        return f"{words} {value}"
+    factor, unit = _UNITS.get(name, (1.0, ""))
+    return f"{words} {factor * value:g}{unit}"

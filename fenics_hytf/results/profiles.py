@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Profiles over depth or height: peak acceleration, shear strain, G/Gmax, damping.
+"""Profiles over depth or height: of the peaks, and of the soil's state.
 
 A column is drawn as steps, one a cell, against depth. Elsewhere cells of a region scatter at every
 height: they are drawn as dots against elevation, with the median of each region in bins of height.
@@ -20,7 +20,7 @@ from matplotlib.ticker import MaxNLocator
 
 from fenics_hytf.motion import GRAVITY
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.style import COLOURS, MAX_LINES, QUIET, label
+from fenics_hytf.results.style import COLOURS, MAX_LINES, QUIET, label, length_unit
 
 RealArray = npt.NDArray[np.floating[Any]]
 
@@ -36,12 +36,82 @@ class _Panel:
 
 
 def profiles(stored: StoredResult) -> Figure:
-    """Draw the profiles, side by side on one axis of depth or height."""
-    panels = _panels(stored)
-    count = len(_lapse_rows(stored)[0])
-    height = stored.cells["z" if "z" in stored.cells else "y"][:count]
-    region = stored.cells["region"][:count]
-    figure = Figure(figsize=(2.3 * len(panels) + 0.8, 5.2))
+    """Peak acceleration and the soil's state: strain, G/Gmax and damping; stress where linear."""
+    acceleration = envelope(stored, "peak_acceleration") / GRAVITY
+    strain = 100.0 * envelope(stored, "peak_strain")
+    panels = [
+        _Panel("Peak total\nacceleration [g]", acceleration),
+        _Panel("Peak shear\nstrain [%]", strain),
+    ]
+    if is_linear(stored):  # G/Gmax is 1 and damping as given everywhere
+        return _draw(stored, [*panels, _stress(stored)])
+    damping = 100.0 * envelope(stored, "damping")
+    panels.append(_Panel("G/Gmax [-]\n", envelope(stored, "g_over_gmax"), limit=1.02))
+    return _draw(stored, [*panels, _Panel("Damping\nratio [%]", damping)])
+
+
+def peak_profiles(stored: StoredResult) -> Figure:
+    """Peak velocity and displacement, relative to the base; shear stress and stress ratio."""
+    displacement = envelope(stored, "peak_displacement")
+    factor, unit = length_unit(float(np.nanmax(displacement, initial=0.0)))
+    panels = [
+        _Panel("Peak relative\nvelocity [m/s]", envelope(stored, "peak_velocity")),
+        _Panel(f"Peak relative\ndisplacement [{unit}]", factor * displacement),
+    ]
+    if not is_linear(stored):
+        panels.append(_stress(stored))
+    ratio = envelope(stored, "stress_ratio")
+    if not np.all(np.isnan(ratio)):
+        effective = stored.summary["scene"]["water_table_m"] is not None
+        below = "effective" if effective else "total"
+        panels.append(_Panel(f"Peak shear stress over\n{below} vertical stress [-]", ratio))
+    return _draw(stored, panels)
+
+
+def caption(stored: StoredResult) -> str:
+    """How to read the profiles."""
+    text = " Values at cell centres."
+    if len(stored.summary["lapses"]) > 1:
+        text += " Over all lapses: the largest of each, of G/Gmax the smallest."
+    if stored.summary["scene"]["mesh"]["kind"] != "column":
+        text += " Dots: cells; lines: median of a region in bins of height."
+    return text
+
+
+def is_linear(stored: StoredResult) -> bool:
+    """Whether the soil keeps its modulus and damping."""
+    return stored.summary["scene"]["strain_ratio"] is None
+
+
+def envelope(stored: StoredResult, name: str) -> RealArray:
+    """Over the lapses the largest value of a column of ``cells.csv``; of G/Gmax the smallest.
+
+    Args:
+        stored: The result.
+        name: The column.
+
+    Returns:
+        In the column's unit, shape ``(num_cells,)``.
+    """
+    extreme = np.fmin if name == "g_over_gmax" else np.fmax
+    column = stored.cells[name]
+    return np.asarray(extreme.reduce([column[rows] for rows in _lapse_rows(stored)]), np.float64)
+
+
+def cell_column(stored: StoredResult, name: str) -> npt.NDArray[Any]:
+    """A column of ``cells.csv`` that is the same in all lapses, shape ``(num_cells,)``."""
+    return np.asarray(stored.cells[name][_lapse_rows(stored)[0]])
+
+
+def _stress(stored: StoredResult) -> _Panel:
+    return _Panel("Peak shear\nstress [kPa]", envelope(stored, "peak_stress") / 1e3)
+
+
+def _draw(stored: StoredResult, panels: Sequence[_Panel]) -> Figure:
+    """The panels side by side on one axis of depth or height."""
+    height = cell_column(stored, "z" if "z" in stored.cells else "y")
+    region = cell_column(stored, "region")
+    figure = Figure(figsize=(max(2.3 * len(panels) + 0.8, 9.0), 5.2))
     axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     edges = _column_edges(stored, height)
     for axis, panel in zip(axes, panels, strict=True):
@@ -63,46 +133,10 @@ def profiles(stored: StoredResult) -> Figure:
     return figure
 
 
-def caption(stored: StoredResult) -> str:
-    """What the profiles show."""
-    text = "Values at cell centres."
-    if len(stored.summary["lapses"]) > 1:
-        text += " Over all lapses: largest acceleration, strain and damping, smallest G/Gmax."
-    if stored.summary["scene"]["mesh"]["kind"] != "column":
-        text += " Dots: cells; lines: median of a region in bins of height."
-    return text
-
-
-def _panels(stored: StoredResult) -> list[_Panel]:
-    acceleration = _envelope(stored, "peak_acceleration", np.fmax)
-    strain = _envelope(stored, "effective_strain", np.fmax)
-    ratio = stored.summary["scene"]["strain_ratio"]
-    panels = [
-        _Panel("Peak total\nacceleration [g]", acceleration / GRAVITY),
-        _Panel("Peak shear\nstrain [%]", 100.0 * strain / (ratio or 1.0)),
-    ]
-    if ratio is None:  # linear: G/Gmax is 1 and damping as given everywhere
-        stress = _envelope(stored, "peak_stress", np.fmax)
-        return [*panels, _Panel("Peak shear\nstress [kPa]", stress / 1e3)]
-    modulus = _envelope(stored, "g_over_gmax", np.fmin)
-    damping = _envelope(stored, "damping", np.fmax)
-    return [
-        *panels,
-        _Panel("G/Gmax [-]\n", modulus, limit=1.02),
-        _Panel("Damping\nratio [%]", 100.0 * damping),
-    ]
-
-
 def _lapse_rows(stored: StoredResult) -> list[npt.NDArray[np.intp]]:
     """Rows of ``cells.csv`` of each lapse."""
     lapse = stored.cells["lapse"]
     return [np.flatnonzero(lapse == index) for index in np.unique(lapse)]
-
-
-def _envelope(stored: StoredResult, name: str, extreme: np.ufunc) -> RealArray:
-    """Extreme over the lapses of a column of ``cells.csv``, shape ``(num_cells,)``."""
-    column = stored.cells[name]
-    return np.asarray(extreme.reduce([column[rows] for rows in _lapse_rows(stored)]), np.float64)
 
 
 def _column_edges(stored: StoredResult, height: RealArray) -> RealArray | None:

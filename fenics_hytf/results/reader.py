@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -20,6 +21,7 @@ from fenics_hytf.results.summary import FORMAT
 RealArray = npt.NDArray[np.float64]
 Table = Mapping[str, npt.NDArray[Any]]
 
+_TABLES = ("receivers", "base", "transfer", "spectra", "cells")
 _BLOCK = 20_000  # rows converted at once
 
 
@@ -33,6 +35,7 @@ class StoredResult:
         folder: Where it stands.
         summary: ``summary.json``.
         receivers: ``receivers.csv``, columns of shape ``(num_samples,)``.
+        base: ``base.csv``, likewise.
         transfer: ``transfer.csv``, all lapses below each other.
         spectra: ``spectra.csv``.
         cells: ``cells.csv``, all lapses below each other; ``region`` holds names.
@@ -41,6 +44,7 @@ class StoredResult:
     folder: Path
     summary: dict[str, Any]
     receivers: Table
+    base: Table
     transfer: Table
     spectra: Table
     cells: Table
@@ -74,27 +78,58 @@ def read_result(folder: Path, summary: dict[str, Any] | None = None) -> StoredRe
         ResultError: If the folder holds no finished result, or files of it are missing or broken.
     """
     if summary is None:
-        check_finished(folder)
+        summary = read_summary(folder)
+    return StoredResult(folder, summary, *read_tables(folder, *_TABLES))
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """Read ``summary.json``.
+
+    Args:
+        folder: The folder of a finished result.
+
+    Returns:
+        The summary.
+
+    Raises:
+        ResultError: If the folder holds no finished result, or one of another format.
+    """
+    check_finished(folder)
+    with _readable(folder):
+        summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
+        found = summary.get("format") if isinstance(summary, dict) else None
+        if found != FORMAT:
+            raise ValueError(f"{FINISHED} is of format {found}, this version reads {FORMAT}")
+    return dict(summary)
+
+
+def read_tables(folder: Path, *names: str) -> list[Table]:
+    """Read tables of a result.
+
+    Args:
+        folder: The folder.
+        names: Of the tables, without ``.csv``.
+
+    Returns:
+        The tables in that order.
+
+    Raises:
+        ResultError: If one is missing or broken.
+    """
+    with _readable(folder):
+        return [read_table(folder / f"{name}.csv") for name in names]
+
+
+@contextmanager
+def _readable(folder: Path) -> Iterator[None]:
+    """Turn what can go wrong with a file into a message that says what to do."""
     try:
-        if summary is None:
-            summary = _summary(folder)
-        tables = [
-            read_table(folder / f"{name}.csv")
-            for name in ("receivers", "transfer", "spectra", "cells")
-        ]
+        yield
     except (OSError, ValueError) as error:
         raise ResultError(
             f"{folder}: found a result that cannot be read ({error}); expected the files as a run "
-            "wrote them. Run the scene again"
+            "of this version wrote them. Run the scene again"
         ) from error
-    return StoredResult(folder, summary, *tables)
-
-
-def _summary(folder: Path) -> dict[str, Any]:
-    summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
-    if not isinstance(summary, dict) or summary.get("format") != FORMAT:
-        raise ValueError(f"{FINISHED} is not of this version")
-    return summary
 
 
 def read_table(path: Path) -> dict[str, npt.NDArray[Any]]:

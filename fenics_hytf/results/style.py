@@ -15,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 from cycler import cycler
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 RealArray = npt.NDArray[np.float64]
@@ -22,6 +23,7 @@ RealArray = npt.NDArray[np.float64]
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
 INK = "#222222"
 QUIET = "#8a8a8a"
+DASHED = (0, (4, 2))
 MAX_LINES = len(COLOURS)
 """Most receivers, regions or lapses that one figure tells apart."""
 
@@ -74,6 +76,12 @@ def label(text: str, longest: int = 28) -> str:
     if text.startswith("_"):
         text = "\u200b" + text  # matplotlib hides labels that start with an underscore
     return text.replace("$", r"\$")
+
+
+def legend(axes: Axes) -> None:
+    """Name the lines of a figure on its right, outside; nothing where none has a name."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.0)
 
 
 def save(figure: Figure, path: Path) -> None:

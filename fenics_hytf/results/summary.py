@@ -17,16 +17,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fenics_hytf
-from fenics_hytf.motion import GRAVITY
+from fenics_hytf.motion import GRAVITY, Intensity, intensity_measures
 from fenics_hytf.results.definition import describe_scene
-from fenics_hytf.results.writers import QUANTITIES
+from fenics_hytf.results.layers import layer_states
+from fenics_hytf.results.writers import QUANTITIES, base_motions
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
     from fenics_hytf.simulation import Result
 
-FORMAT = 1
+FORMAT = 2
 """Raised when a key of the summary changes its meaning."""
+
+_ROUNDING = 1e-9  # of the largest peak: below, a component does not move
 
 PHASES = ("setup", "assembly", "sweep", "response", "convection", "output")
 
@@ -66,9 +69,11 @@ def summarise(result: Result) -> dict[str, Any]:
         "samples": int(result.base_acceleration.shape[1]),
         "duration_s": result.dt * result.base_acceleration.shape[1],
         "motions": _motions(result),
+        "base": _base(result),
         "receivers": _receivers(result),
-        "lapses": [_lapse(lapse) for lapse in result.lapses],
+        "lapses": [_lapse(result, lapse) for lapse in result.lapses],
         "peaks": _peaks(result),
+        "intensity": _intensity(result),
         "work": work,
         "wall_s": seconds,
         "peak_memory_bytes": result.peak_memory,
@@ -90,6 +95,11 @@ def warnings(result: Result) -> list[str]:
         lost = lapse.ledger.parked + lapse.ledger.deleted
         if lost:
             found.append(f"Lapse {lapse.index}: {lost} points had left the mesh by its end.")
+    if result.scene.output.water_table is not None and result.scene.mesh.size is None:
+        found.append(
+            "output.water_table is not used: the vertical stress, and with it the stress ratio, is "
+            "known below the level surface of a column or box only."
+        )
     if result.scene.effects.equivalent_linear is not None:
         strains = [lapse.cells.effective_strain for lapse in result.lapses]
         strain = max((float(np.nanmax(s, initial=0.0)) for s in strains), default=0.0)
@@ -115,6 +125,24 @@ def component_peaks(summary: Mapping[str, Any]) -> dict[str, float]:
         component: max((peaks[f"A_{component}"] or 0.0 for peaks in receivers), default=0.0)
         for component in summary["components"]
     }
+
+
+def moving_components(summary: Mapping[str, Any], receiver: str | None = None) -> list[str]:
+    """Components that move by more than rounding.
+
+    Args:
+        summary: As :func:`summarise` makes it.
+        receiver: In which a component moves; in any if ``None``.
+
+    Returns:
+        Their names.
+    """
+    peaks = component_peaks(summary)
+    largest = max(peaks.values(), default=0.0)
+    if receiver is not None:
+        peaks = {c: summary["peaks"][receiver][f"A_{c}"] for c in peaks}
+    # a receiver whose point has left the mesh has no peak, but it moved
+    return [c for c, peak in peaks.items() if peak is None or peak > _ROUNDING * largest]
 
 
 def versions() -> dict[str, str | None]:
@@ -181,6 +209,41 @@ def _motions(result: Result) -> list[dict[str, Any]]:
     return motions
 
 
+def _base(result: Result) -> dict[str, dict[str, Any]]:
+    """Peak and intensity of the base's motions, by direction; the outcrop's where it is known."""
+    base: dict[str, dict[str, Any]] = {}
+    for kind, direction, motion in base_motions(result):
+        measures = intensity_measures(motion, result.dt)
+        told = base.setdefault(direction, {"outcrop_pga_g": None, "outcrop_intensity": None})
+        told[f"{kind}_pga_g"] = measures.pga / GRAVITY
+        told[f"{kind}_intensity"] = _with_units(measures)
+    return base
+
+
+def _intensity(result: Result) -> dict[str, dict[str, dict[str, float]]]:
+    """Intensity measures of the total motion by receiver and component."""
+    history = result.history("total_acceleration")
+    return {
+        receiver: {
+            component: _with_units(intensity_measures(history[r, c], result.dt))
+            for c, component in enumerate(result.components)
+        }
+        for r, receiver in enumerate(result.receivers)
+    }
+
+
+def _with_units(measures: Intensity) -> dict[str, float]:
+    """Intensity measures under keys that carry their units."""
+    return {
+        "pga_m_s2": measures.pga,
+        "pgv_m_s": measures.pgv,
+        "pgd_m": measures.pgd,
+        "arias_m_s": measures.arias,
+        "cav_m_s": measures.cav,
+        "d5_95_s": measures.significant_duration,
+    }
+
+
 def _receivers(result: Result) -> dict[str, Any]:
     return {
         name: {"place_m": place, "rides": result.scene.output.receivers[name].rides}
@@ -188,7 +251,7 @@ def _receivers(result: Result) -> dict[str, Any]:
     }
 
 
-def _lapse(lapse: LapseResult) -> dict[str, Any]:
+def _lapse(result: Result, lapse: LapseResult) -> dict[str, Any]:
     change = lapse.loop.change
     return {
         "index": lapse.index,
@@ -202,6 +265,7 @@ def _lapse(lapse: LapseResult) -> dict[str, Any]:
         "final_change": change[-1] if change else None,
         "change": change,
         "worst_cell": lapse.loop.worst_cell,
+        "layers": layer_states(result.scene, result.region_names, lapse),
         "worst_residual": lapse.worst_residual,
         "points_lost": lapse.ledger.deleted,
         "points_parked": lapse.ledger.parked,

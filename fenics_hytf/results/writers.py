@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables of a result as CSV: histories, transfer functions, response spectra, cells.
+"""The tables of a result as CSV: histories, base, transfer functions, response spectra, cells.
 
 Numbers are written with the fewest digits that give back the same double. A number that does not
 exist (not finite) is an empty field. Rows are written in blocks; no file is ever a string.
@@ -39,13 +39,14 @@ _BLOCK = 2048  # rows formatted at once
 
 
 def write_tables(folder: Path, result: Result) -> None:
-    """Write ``receivers.csv``, ``transfer.csv``, ``spectra.csv`` and ``cells.csv``.
+    """Write the tables: ``receivers``, ``base``, ``transfer``, ``spectra`` and ``cells.csv``.
 
     Args:
         folder: Where.
         result: The simulation.
     """
     _write_table(folder / "receivers.csv", *_receivers(result))
+    _write_table(folder / "base.csv", *_base(result))
     _write_table(folder / "transfer.csv", *_transfer(result))
     _write_table(folder / "spectra.csv", *_spectra(result))
     _write_table(folder / "cells.csv", *_cells(result))
@@ -90,6 +91,30 @@ def _receivers(result: Result) -> tuple[list[str], Rows]:
     return header, _rows([time, *columns])
 
 
+def base_motions(result: Result) -> Iterator[tuple[str, str, RealArray]]:
+    """The motions of the base, within and, where the rock is known, outcrop.
+
+    Args:
+        result: The simulation.
+
+    Yields:
+        ``within`` or ``outcrop``, direction, and acceleration [m/s^2], shape ``(num_samples,)``.
+    """
+    outcrop = result.outcrop_acceleration
+    for m, direction in enumerate(result.directions):
+        yield "within", direction, result.within_acceleration[m]
+        if outcrop is not None:
+            yield "outcrop", direction, outcrop[m]
+
+
+def _base(result: Result) -> tuple[list[str], Rows]:
+    """Time and the motions of the base [m/s^2]."""
+    motions = list(base_motions(result))
+    header = ["time_s", *(f"{kind}.A_{direction}" for kind, direction, _ in motions)]
+    samples = sum(lapse.num_samples for lapse in result.lapses)
+    return header, _rows([result.time[:samples], *(values for *_, values in motions)])
+
+
 def _transfer(result: Result) -> tuple[list[str], Rows]:
     """Total acceleration over the input as given on the solved lines, one block a lapse."""
     header = ["frequency_hz", "lapse"]
@@ -110,7 +135,7 @@ def _transfer(result: Result) -> tuple[list[str], Rows]:
 
 
 def _spectra(result: Result) -> tuple[list[str], Rows]:
-    """5 % damped pseudo-acceleration of the receivers and of the input [m/s^2]."""
+    """5 % damped pseudo-acceleration of the receivers, the input and the base [m/s^2]."""
     header = ["period_s"]
     columns: list[RealArray] = []
     history = result.history("total_acceleration")
@@ -121,6 +146,9 @@ def _spectra(result: Result) -> tuple[list[str], Rows]:
     for m, direction in enumerate(result.directions):
         header.append(f"input.{direction}")
         columns.append(_spectrum(result.base_acceleration[m], result.dt))
+    for kind, direction, motion in base_motions(result):
+        header.append(f"{kind}.{direction}")
+        columns.append(_spectrum(motion, result.dt))
     return header, _rows([SPECTRUM_PERIODS, *columns])
 
 
@@ -130,25 +158,48 @@ def _spectrum(acceleration: RealArray, dt: float) -> RealArray:
     return response_spectrum(acceleration, dt, SPECTRUM_PERIODS, SPECTRUM_DAMPING)
 
 
+CELL_VALUES = (
+    "shear_modulus",
+    "g_over_gmax",
+    "damping",
+    "effective_strain",
+    "peak_stress",
+    "peak_acceleration",
+    "peak_velocity",
+    "peak_displacement",
+    "peak_strain",
+    "vertical_stress",
+    "stress_ratio",
+    "change",
+)
+"""Columns of ``cells.csv`` after the place: of a cell's state, and what the overburden adds."""
+
+
 def _cells(result: Result) -> tuple[list[str], Rows]:
     """Values of the cells, one block a lapse."""
-    places = ["x", "y", "z"][: len(result.components)]
-    values = ["shear_modulus", "g_over_gmax", "damping", "effective_strain", "peak_stress"]
-    values.append("peak_acceleration")
+    # the solver's room takes a second to load: who only draws does without
+    from fenics_hytf.simulation.overburden import vertical_stress
+
+    centroid = result.lapses[0].cells.centroid
+    places = ["x", "y", "z"][: centroid.shape[1]]
     names = np.array(result.region_names, dtype=object)
+    overburden = vertical_stress(result.scene, centroid)
 
     def block(lapse: LapseResult) -> Rows:
         cells = lapse.cells
         count = cells.region.size
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.where(overburden > 0.0, cells.peak_stress / overburden, np.nan)
+        values = vars(cells) | {"vertical_stress": overburden, "stress_ratio": ratio}
         return _rows(
             [
                 np.full(count, lapse.index),
                 np.arange(count),
                 names[cells.region],
-                *cells.centroid.T,
-                *(getattr(cells, value) for value in values),
+                *centroid.T,
+                *(values[name] for name in CELL_VALUES),
             ]
         )
 
     rows = (row for lapse in result.lapses for row in block(lapse))
-    return ["lapse", "cell", "region", *places, *values], rows
+    return ["lapse", "cell", "region", *places, *CELL_VALUES], rows

@@ -244,11 +244,14 @@ class Output(Table):
             letters, digits, ``_`` and ``-``.
         fields: Whether nodal fields are written.
         every: Snapshots every so many lapses.
+        water_table: Elevation of the water table [m], for effective vertical stress; or ``None``:
+            total stress.
     """
 
     receivers: dict[str, Receiver] = Field({}, description="a table of places")
     fields: bool = Field(False, description="true or false")
     every: Count = Field(1, description="a whole number from 1")
+    water_table: float | None = Field(None, description="an elevation [m]")
 
 
 def read_output(

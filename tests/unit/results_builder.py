@@ -11,12 +11,21 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Result, Snapshot, Work
 
 COMPONENTS = ("x", "y", "z")
+ROCK = {"density": 2243.0, "shear_wave_velocity": 760.0, "poisson": 0.25, "damping": 0.01}
 
 
 def make_scene(
-    directions=("x",), lapses=1, loop=True, gdim=2, kind="column", receivers=3, samples=240, **extra
+    directions=("x",),
+    lapses=1,
+    loop=True,
+    gdim=2,
+    kind="column",
+    receivers=3,
+    samples=240,
+    compliant=False,
+    **extra,
 ):
-    """A valid scene."""
+    """A valid scene; compliant: on rock, under outcrop motions."""
     sand = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "damping": 0.02}
     fill = {**sand, "shear_wave_velocity": 150.0}
     if loop:
@@ -33,19 +42,23 @@ def make_scene(
         cells = [20, 12] if gdim == 2 else [8, 6, 12]
         regions = [{"soil": "sand", "below": 20.0}, {"soil": "fill"}]
         mesh = {"box": {"size": size, "cells": cells}, "regions": regions}
+    if gdim == 2 and directions == ("z",):
+        mesh["kinematics"] = "antiplane"
     places = {
         f"r{i}": [0.5] * (gdim - 1) + [24.0 - 24.0 * i / max(receivers, 2)]
         for i in range(receivers)
     }
     synthetic = {"n": samples, "dt": 0.05}
+    given = {"synthetic": synthetic, "pga": 0.2, "input": "outcrop" if compliant else "within"}
     data = {
         "title": "A made-up scene",
         "mesh": mesh,
         "soil": {"sand": sand, "fill": fill},
-        "motion": [{"direction": d, "synthetic": synthetic, "pga": 0.2} for d in directions],
+        "motion": [{"direction": d, **given} for d in directions],
         "lapses": {"count": lapses},
         "output": {"receivers": places},
         **({"effects": {"equivalent_linear": True}} if loop else {}),
+        **({"boundary": {"base": {"compliant": ROCK}}} if compliant else {}),
         **extra,
     }
     return Scene.from_dict(data)
@@ -58,10 +71,12 @@ def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", *
     places = np.array([scene.output.receivers[r].place for r in receivers]).reshape(-1, gdim)
     dt, samples = scene.dt, scene.motion[0].record.num_samples
     base = np.array([m.record.acceleration for m in scene.motion])
+    components = directions if directions == ("z",) and gdim == 2 else COMPONENTS[:gdim]
+    rock = scene.boundary.rock is not None
     return Result(
         scene=scene,
         num_ranks=1,
-        components=COMPONENTS[:gdim],
+        components=components,
         directions=tuple(directions),
         receivers=receivers,
         places=places,
@@ -69,7 +84,7 @@ def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", *
         dt=dt,
         base_acceleration=base,
         lapses=tuple(
-            _lapse(i, samples // lapses, dt, base, directions, places, loop, gdim, kind)
+            _lapse(i, samples // lapses, dt, base, directions, places, loop, components, kind, rock)
             for i in range(lapses)
         ),
         sizes={"cells": _centroids(gdim, kind).shape[0], "unknowns": 60, "points": 56},
@@ -108,18 +123,20 @@ def make_snapshot(index=0, fields=True, gdim=2):
     )
 
 
-def _lapse(index, samples, dt, base, directions, places, loop, gdim, kind):
+def _lapse(index, samples, dt, base, directions, places, loop, components, kind, rock):
+    here = slice(index * samples, (index + 1) * samples)
     time = dt * np.arange(index * samples, (index + 1) * samples)
-    shape = (len(places), gdim, samples)
+    gdim = places.shape[1]
+    shape = (len(places), len(components), samples)
     u, total = np.zeros(shape), np.zeros(shape)
     acceleration = np.zeros(shape)
     frequency = np.arange(1, 61) / (samples * dt) * 2.0
-    transfer = np.zeros((len(places), gdim, len(directions), frequency.size), complex)
+    transfer = np.zeros((*shape[:2], len(directions), frequency.size), complex)
     for m, direction in enumerate(directions):
-        c = COMPONENTS.index(direction)
+        c = components.index(direction)
         for r, place in enumerate(places):
             amplification = 1.0 + 1.5 * place[-1] / 24.0
-            record = base[m, index * samples : (index + 1) * samples]
+            record = base[m, here]
             total[r, c] = amplification * record
             acceleration[r, c] = total[r, c] - record
             u[r, c] = 0.01 * (amplification - 1.0) * np.sin(2 * np.pi * 0.7 * time)
@@ -148,6 +165,8 @@ def _lapse(index, samples, dt, base, directions, places, loop, gdim, kind):
         velocity=0.5 * u,
         acceleration=acceleration,
         total_acceleration=total,
+        within=(0.7 if rock else 1.0) * base[:, here],
+        outcrop=base[:, here] if rock else None,
         cells=CellState(
             region=region,
             centroid=centroid,
@@ -158,6 +177,9 @@ def _lapse(index, samples, dt, base, directions, places, loop, gdim, kind):
             peak_strain=strain,
             peak_stress=gmax * ratio * strain,
             peak_acceleration=2.0 + 3.0 * np.exp(-depth / 8.0),
+            peak_velocity=0.4 * np.exp(-depth / 8.0),
+            peak_displacement=0.02 * np.exp(-depth / 8.0),
+            change=np.where(region == 1, 7e-4, 2e-4) if loop else np.zeros_like(ratio),
         ),
         ledger=MassLedger(56, 44_040.0, 0, 0.0, 0, 0.0, 0, 44_040.0, 0.0),
     )

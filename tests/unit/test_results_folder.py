@@ -37,6 +37,16 @@ def test_finished_is_refused_without_force(tmp_path):
     assert folder_faults(tmp_path / "r", force=True) == []
 
 
+def test_every_file_of_a_run_goes_when_it_is_replaced(tmp_path):
+    with open_result(tmp_path / "r") as folder:
+        folder.snapshot(make_snapshot())
+        folder.write(make_result(kind="box", compliant=True, receivers=1), publish)
+    assert {"base_x.png", "fourier_x.png", "section.png"} <= set(names(tmp_path / "r"))
+    with open_result(tmp_path / "r", force=True) as folder:
+        folder.snapshot(make_snapshot(index=9, fields=False))
+        assert names(tmp_path / "r") == [".hytf.lock", "points_0009.vtu"]
+
+
 def test_force_touches_nothing_before_it_writes(tmp_path):
     with open_result(tmp_path / "r") as folder:
         folder.snapshot(make_snapshot(index=5))
@@ -111,7 +121,8 @@ def test_summary_is_last_and_whole(tmp_path):
     with open_result(tmp_path / "r") as folder:
         folder.write(make_result(), look)
     assert "summary.json" not in seen[0]
-    assert {"receivers.csv", "transfer.csv", "spectra.csv", "cells.csv"} <= set(seen[0])
+    tables = {"receivers.csv", "base.csv", "transfer.csv", "spectra.csv", "cells.csv"}
+    assert tables <= set(seen[0])
     assert "summary.json" in names(tmp_path / "r")
     assert not [name for name in names(tmp_path / "r") if name.startswith(".")]
 
@@ -157,6 +168,10 @@ def test_unreadable_results_are_refused(tmp_path):
         (tmp_path / "r/summary.json").write_text(broken)
         with pytest.raises(ResultError, match="cannot be read"):
             read_result(tmp_path / "r")
+    old = json.dumps({**json.loads(text), "format": 1})
+    (tmp_path / "r/summary.json").write_text(old)
+    with pytest.raises(ResultError, match=r"of format 1, this version reads 2.*Run the scene"):
+        publish(tmp_path / "r")
     (tmp_path / "r/summary.json").write_text(text)
     (tmp_path / "r/cells.csv").write_text("lapse,cell\n1\n")
     with pytest.raises(ResultError, match="do not fit"):

@@ -12,7 +12,12 @@ import meshio
 import numpy as np
 import pytest
 
-from fenics_hytf.motion import response_spectrum
+from fenics_hytf.motion import (
+    GRAVITY,
+    arias_intensity,
+    intensity_measures,
+    response_spectrum,
+)
 from fenics_hytf.results import open_result, read_result, read_table
 from fenics_hytf.results.summary import plain
 from tests.unit.results_builder import make_result, make_snapshot
@@ -23,7 +28,10 @@ CASES = [
     {"directions": ("x", "y"), "loop": False},
     {"directions": ("x", "z"), "gdim": 3, "kind": "box", "lapses": 3},
     {"kind": "box", "loop": False, "receivers": 0},
+    {"compliant": True},
+    {"directions": ("z",), "kind": "box"},
 ]
+LAYERS = [(4.0, "fill", 4), (10.0, "sand", 5), (10.0, "fill", 5)]
 
 
 def write(folder, result):
@@ -95,34 +103,162 @@ def test_spectra_of_receivers_and_input(tmp_path):
     write(tmp_path / "r", result)
     table = read_table(tmp_path / "r/spectra.csv")
     assert list(table)[:3] == ["period_s", "r0.PSA_x", "r0.PSA_y"]
-    assert list(table)[-1] == "input.x"
+    assert list(table)[-2:] == ["input.x", "within.x"]
     expected = response_spectrum(result.base_acceleration[0], result.dt, table["period_s"])
     np.testing.assert_array_equal(table["input.x"], expected)
     # the receiver's total acceleration is 2.5 times the input by construction; round-off of a sum
     # over 240 samples
     np.testing.assert_allclose(table["r0.PSA_x"], 2.5 * table["input.x"], rtol=1e-12)
     assert not np.any(table["r0.PSA_y"])
+    np.testing.assert_array_equal(table["within.x"], table["input.x"])
+
+
+@pytest.mark.parametrize("directions", [("x",), ("x", "y")])
+def test_the_base_within_and_outcrop(tmp_path, directions):
+    result = make_result(directions=directions, compliant=True, lapses=3)
+    summary = write(tmp_path / "r", result)
+    names = [f"{kind}.A_{d}" for d in directions for kind in ("within", "outcrop")]
+    assert header(tmp_path / "r/base.csv") == ["time_s", *names]
+    table = read_table(tmp_path / "r/base.csv")
+    np.testing.assert_array_equal(table["time_s"], result.time)
+    spectra = read_table(tmp_path / "r/spectra.csv")
+    for m, d in enumerate(directions):
+        for kind, motion in (
+            ("within", result.within_acceleration[m]),
+            ("outcrop", result.outcrop_acceleration[m]),
+        ):
+            np.testing.assert_array_equal(table[f"{kind}.A_{d}"], motion)
+            expected = response_spectrum(motion, result.dt, spectra["period_s"])
+            np.testing.assert_array_equal(spectra[f"{kind}.{d}"], expected)
+            told = summary["base"][d]
+            assert told[f"{kind}_pga_g"] == np.abs(motion).max() / GRAVITY
+            arias = float(arias_intensity(motion, result.dt))
+            assert told[f"{kind}_intensity"]["arias_m_s"] == arias
+
+
+def test_a_base_without_rock_has_no_outcrop(tmp_path):
+    summary = write(tmp_path / "r", make_result())
+    assert header(tmp_path / "r/base.csv") == ["time_s", "within.A_x"]
+    told = summary["base"]["x"]
+    # scaled to 0.2 g by the scene; round-off
+    assert told["within_pga_g"] == pytest.approx(0.2, rel=1e-12)
+    assert told["outcrop_pga_g"] is None and told["outcrop_intensity"] is None
+
+
+def test_intensity_of_every_receiver(tmp_path):
+    result = make_result(directions=("x", "z"), gdim=3, kind="box", lapses=3)
+    summary = write(tmp_path / "r", result)
+    history = result.history("total_acceleration")
+    for r, name in enumerate(result.receivers):
+        for c, component in enumerate(result.components):
+            told = summary["intensity"][name][component]
+            expected = intensity_measures(history[r, c], result.dt)
+            assert told["pga_m_s2"] == expected.pga and told["pgv_m_s"] == expected.pgv
+            assert told["pgd_m"] == expected.pgd and told["cav_m_s"] == expected.cav
+            assert told["arias_m_s"] == expected.arias
+            if component == "y":  # does not move
+                assert told["pga_m_s2"] == 0.0 and told["d5_95_s"] is None
+            else:
+                assert told["d5_95_s"] == expected.significant_duration
+
+
+def test_layers_of_a_column(tmp_path):
+    result = make_result(lapses=3)
+    layers = write(tmp_path / "r", result)["lapses"][1]["layers"]
+    cells = result.lapses[1].cells
+    assert [layer["soil"] for layer in layers] == ["fill", "sand"]
+    assert [layer["depth_m"] for layer in layers] == [[0.0, 4.0], [4.0, 24.0]]
+    assert [layer["cells"] for layer in layers] == [4, 10]
+    assert [layer["change"] for layer in layers] == [7e-4, 2e-4]
+    assert [layer["converged"] for layer in layers] == [True, True]
+    sand = cells.region == 0
+    for key in ("effective_strain", "g_over_gmax", "damping"):
+        values = getattr(cells, key)[sand]
+        assert layers[1][key] == [values.min(), values.max()]
+
+
+def test_layers_of_one_soil_at_two_depths_are_two(tmp_path):
+    layers = [{"thickness": t, "soil": s, "cells": c} for t, s, c in LAYERS]
+    result = make_result(mesh={"column": {"width": 1.0, "layers": layers}})
+    told = write(tmp_path / "r", result)["lapses"][0]["layers"]
+    assert [(i["soil"], i["depth_m"], i["cells"]) for i in told] == [
+        ("fill", [0.0, 4.0], 4),
+        ("sand", [4.0, 14.0], 5),
+        ("fill", [14.0, 24.0], 5),
+    ]
+
+
+def test_a_layer_that_has_not_converged_says_so(tmp_path):
+    result = make_result()
+    lapse = result.lapses[0]
+    change = np.where(lapse.cells.region == 0, 2e-3, 1e-4)  # the tolerance is 1e-3
+    lapse = replace(lapse, cells=replace(lapse.cells, change=change))
+    layers = write(tmp_path / "r", replace(result, lapses=(lapse,)))["lapses"][0]["layers"]
+    assert [layer["converged"] for layer in layers] == [True, False]
+
+
+def test_regions_of_a_box_from_the_top_and_no_loop(tmp_path):
+    result = make_result(kind="box", loop=False)
+    layers = write(tmp_path / "r", result)["lapses"][0]["layers"]
+    assert [layer["soil"] for layer in layers] == ["fill", "sand"]
+    # cells 2 m high: centres from 1 to 19 m and from 21 to 23 m
+    np.testing.assert_allclose([i["elevation_m"] for i in layers], [[21, 23], [1, 19]], rtol=1e-14)
+    assert [layer["change"] for layer in layers] == [None, None]
+    assert [layer["converged"] for layer in layers] == [None, None]
 
 
 def test_cells_of_every_lapse(tmp_path):
     result = make_result(directions=("x",), gdim=3, kind="box", lapses=3)
     write(tmp_path / "r", result)
     expected = "lapse,cell,region,x,y,z,shear_modulus,g_over_gmax,damping,effective_strain,"
-    expected += "peak_stress,peak_acceleration"
+    expected += "peak_stress,peak_acceleration,peak_velocity,peak_displacement,peak_strain,"
+    expected += "vertical_stress,stress_ratio,change"
     assert ",".join(header(tmp_path / "r/cells.csv")) == expected
     table = read_table(tmp_path / "r/cells.csv")
     cells = result.lapses[2].cells
     here = table["lapse"] == 2
     np.testing.assert_array_equal(table["cell"][here], np.arange(576))
     np.testing.assert_array_equal(table["z"][here], cells.centroid[:, 2])
-    np.testing.assert_array_equal(table["damping"][here], cells.damping)
+    for name in ("damping", "peak_velocity", "peak_displacement", "peak_strain", "change"):
+        np.testing.assert_array_equal(table[name][here], getattr(cells, name))
+    # 20 m of sand below 4 m of fill, 1835 kg/m3 both
+    stress = GRAVITY * 1835.0 * (24.0 - cells.centroid[:, 2])
+    np.testing.assert_allclose(table["vertical_stress"][here], stress, rtol=1e-13)
+    np.testing.assert_allclose(table["stress_ratio"][here], cells.peak_stress / stress, rtol=1e-13)
     names = np.array(result.region_names, dtype=object)[cells.region]
     np.testing.assert_array_equal(table["region"][here], names)
 
 
-def test_plane_cells_have_no_z(tmp_path):
-    write(tmp_path / "r", make_result())
+@pytest.mark.parametrize("case", [{}, {"directions": ("z",), "kind": "box"}], ids=str)
+def test_plane_cells_have_no_z(tmp_path, case):
+    write(tmp_path / "r", make_result(**case))
     assert header(tmp_path / "r/cells.csv")[3:6] == ["x", "y", "shear_modulus"]
+
+
+def test_below_a_water_table_the_stress_ratio_is_larger(tmp_path):
+    result = make_result()
+    output = dict(result.scene.data["output"], water_table=20.0)
+    write(tmp_path / "dry", result)
+    write(tmp_path / "wet", make_result(output=output))
+    dry, wet = (read_table(tmp_path / name / "cells.csv") for name in ("dry", "wet"))
+    uplift = 9810.0 * np.maximum(20.0 - dry["y"], 0.0)
+    # differences of numbers up to 4e5
+    np.testing.assert_allclose(dry["vertical_stress"] - wet["vertical_stress"], uplift, atol=1e-9)
+    ratio = wet["peak_stress"] / wet["vertical_stress"]
+    np.testing.assert_allclose(wet["stress_ratio"], ratio, rtol=1e-15)
+
+
+def test_without_level_ground_there_is_no_vertical_stress(tmp_path):
+    (tmp_path / "slope.msh").write_text("")
+    mesh = {"file": str(tmp_path / "slope.msh")}
+    output = {"receivers": {"r0": [0.5, 24.0]}, "water_table": 3.0}
+    result = make_result(loop=False, kind="box", mesh=mesh, output=output)
+    summary = write(tmp_path / "r", result)
+    with (tmp_path / "r/cells.csv").open(encoding="utf-8") as file:
+        assert {(row["vertical_stress"], row["stress_ratio"]) for row in csv.DictReader(file)} == {
+            ("", "")
+        }
+    assert any("output.water_table is not used" in text for text in summary["warnings"])
 
 
 def test_what_does_not_exist_is_empty_or_null(tmp_path):

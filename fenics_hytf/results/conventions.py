@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: MIT
+"""The method and its conventions in plain words, as they hold for one result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from fenics_hytf.motion import GRAVITY
+from fenics_hytf.results.markup import count, listed, number
+
+Summary = Mapping[str, Any]
+
+_MODULUS = {
+    "hysteretic": "G(1 + 2iD)",
+    "kramer": "G(1 − D² + 2iD)",
+    "shake91": "G(1 − 2D² + 2iD√(1 − D²))",
+    "dormieux": "G(√(1 − 4D²) + 2iD)",
+}
+
+_KINDS = {
+    "rigid": "held to the input's motion",
+    "fixed": "held to the input's motion",
+    "roller": "held to the input's motion across the boundary and free along it",
+    "tied": "tied to the opposite side, so that both move alike, as in level ground without end",
+    "free": "free of stress",
+    "dashpot": "lined with dashpots (ρVp across and ρVs along the boundary) that let waves out",
+    "free_field": (
+        "joined by dashpots to level ground of the same soil, a column solved along with the rest"
+    ),
+}
+
+
+def method(summary: Summary) -> list[str]:
+    """What was computed, and how, in a few paragraphs.
+
+    Args:
+        summary: ``summary.json``.
+
+    Returns:
+        Paragraphs of plain text.
+    """
+    parts = (_analysis, _soil, _modulus, _base, _sides, _lines, _quantities)
+    return [" ".join(part(summary)) for part in parts]
+
+
+def rock_words(rock: Mapping[str, float]) -> str:
+    """The properties of the rock."""
+    return (
+        f"density {number(rock['density'], 5)} kg/m³, Vs {number(rock['shear_wave_velocity'], 4)} "
+        f"m/s, Poisson's ratio {rock['poisson']:g}, damping {100 * rock['damping']:g} %"
+    )
+
+
+def _analysis(summary: Summary) -> Iterator[str]:
+    lapses = summary["lapses"]
+    yield (
+        "The response of the ground is computed in the frequency domain: the motion is taken apart "
+        "into its Fourier lines, the equations of motion of a finite-element mesh, whose mass is "
+        "carried by material points, are solved for each line, and the lines are summed again."
+    )
+    if summary["scene"]["mesh"]["kinematics"] == "antiplane":
+        yield "The section moves across its plane (SH waves)."
+    length = lapses[0]["samples"] * summary["dt_s"]
+    if len(lapses) == 1:
+        yield (
+            f"The analysed time of {length:g} s is taken as one period of a motion that repeats "
+            "itself; quiet at its end lets the response die out."
+        )
+        return
+    yield (
+        f"The motion is cut into {len(lapses)} lapses of {length:g} s. Stiffness and damping are "
+        "constant within a lapse and found anew for the next."
+    )
+    if summary["scene"]["continuity"] == "steady":
+        yield "Each lapse is taken as periodic, so nothing is carried from one to the next."
+    if "convection" in summary["effects"]:
+        yield "Between lapses the material points move with the ground."
+
+
+def _soil(summary: Summary) -> Iterator[str]:
+    scene = summary["scene"]
+    if scene["strain_ratio"] is None:
+        yield "The soil is linear: it keeps the shear modulus and the damping ratio of the table."
+        return
+    ratio = f"{scene['strain_ratio']:g}"
+    if scene["magnitude"] is not None:
+        magnitude = f"{scene['magnitude']:g}"
+        ratio += f" (from the magnitude, (M − 1)/10 with M = {magnitude}; Idriss and Sun, 1992)"
+    yield (
+        "The soil is equivalent linear (Seed and Idriss, 1969): in every cell the shear modulus G "
+        "and the damping ratio D are read from the soil's curves at the effective shear strain, "
+        f"{ratio} times the largest one at the cell's centre, and the motion is solved again until "
+        f"neither changes by more than {100 * scene['loop_tolerance']:g} % in any cell."
+    )
+    yield f"Shear strain is {_strain_measure(summary)}."
+
+
+def _strain_measure(summary: Summary) -> str:
+    scene = summary["scene"]
+    if scene["mesh"]["kinematics"] == "antiplane":
+        return "√(γxz² + γyz²)"
+    if len(summary["components"]) == 2 and scene["strain_measure"] == "plane":
+        column = scene["mesh"]["kind"] == "column"
+        return "√((εx − εy)² + γxy²)" + (", |γxy| in a column sheared along x" if column else "")
+    return "the largest difference between principal strains"
+
+
+def _modulus(summary: Summary) -> Iterator[str]:
+    scene = summary["scene"]
+    solver = scene["solver"]
+    name = solver["complex_modulus"]
+    yield (
+        "Damping does not depend on frequency: it enters through the complex shear modulus "
+        f"G* = {_MODULUS.get(name, name)}, the convention named {name}."
+    )
+    yield (
+        "The factor G*/G multiplies all elastic constants, so Poisson's ratio is kept."
+        if solver["keep"] == "poisson"
+        else "It takes the place of G only; the bulk modulus is kept and has no damping."
+    )
+    if scene["rayleigh"] is not None:
+        alpha, beta = scene["rayleigh"]["alpha"], scene["rayleigh"]["beta"]
+        yield f"Viscous damping C = αM + βK is added, α = {alpha:g} 1/s and β = {beta:g} s."
+
+
+def _base(summary: Summary) -> Iterator[str]:
+    rock = summary["scene"]["rock"]
+    given = summary["motions"][0]["input"]
+    if rock is None:
+        yield (
+            "The base is rigid. The input is a within motion: the total motion of the base, under "
+            "the soil."
+        )
+    elif given == "outcrop":
+        yield (
+            "The base is compliant: the ground stands on a half-space of rock "
+            f"({rock_words(rock)}), which takes up the waves that come down. The input is an "
+            "outcrop motion: that of the surface of the bare rock, twice the wave that comes up. "
+            "The within motion, that of the base under the soil, is part of the result."
+        )
+    else:
+        yield (
+            "The input is a within motion, that of the base under the soil, and the base is held "
+            f"to it. The rock below ({rock_words(rock)}) serves to find the outcrop motion that "
+            "belongs to it: that of the surface of the bare rock, twice the wave that comes up."
+        )
+
+
+def _sides(summary: Summary) -> Iterator[str]:
+    by_kind: dict[str, list[str]] = {}
+    for name, kind in summary["scene"]["boundary"].items():
+        if name != "base":
+            by_kind.setdefault(kind, []).append(name)
+    held = [f"{listed(names)} {_KINDS.get(kind, kind)}" for kind, names in by_kind.items()]
+    if held:
+        yield f"The other boundaries: {'; '.join(held)}."
+    if summary["scene"]["mesh"]["kind"] == "file":
+        yield "Boundaries that the scene does not name are free of stress."
+    calm = summary["scene"]["calm"]
+    if calm is not None:
+        yield (
+            f"Along {listed(calm['sides'])} a layer {calm['thickness']:g} m thick absorbs waves: "
+            f"damping grows by up to {calm['damping']:g} towards the side."
+        )
+
+
+def _lines(summary: Summary) -> Iterator[str]:
+    lapses, solver = summary["lapses"], summary["scene"]["solver"]
+    solved, excited = (sum(lapse[f"{w}_lines"] for lapse in lapses) for w in ("solved", "excited"))
+    spacing = 1.0 / (lapses[0]["samples"] * summary["dt_s"])
+    limit = solver["max_frequency"]
+    nyquist = f"{0.5 / summary['dt_s']:g} Hz, the Nyquist frequency"
+    highest = nyquist if limit is None else f"{limit:g} Hz"
+    threshold = f"{solver['excited']:g}".replace("e-0", "e-")
+    yield (
+        f"{count(excited, 'Fourier line')} {'carries' if excited == 1 else 'carry'} more than "
+        f"{threshold} of the spectrum's peak; {'all' if solved == excited else solved} of them, "
+        f"up to {highest}, {'was' if solved == 1 else 'were'} solved. Lines are {spacing:.3g} Hz "
+        "apart; the others count as zero in the input and in the response alike."
+    )
+
+
+def _quantities(summary: Summary) -> Iterator[str]:
+    water = summary["scene"]["water_table_m"]
+    yield (
+        f"Relative motions are relative to the base; total ones include it. 1 g = {GRAVITY} m/s². "
+        "PGV and PGD are peaks of the total motion, integrated in the frequency domain. Arias "
+        "intensity is π/(2g)∫a²dt, CAV is ∫|a|dt, and D5-95 the time in which the Arias intensity "
+        "grows from 5 to 95 %."
+    )
+    if summary["scene"]["mesh"]["kind"] == "file":
+        return
+    yield (
+        "The stress ratio is the peak shear stress over the "
+        + ("total" if water is None else "effective")
+        + " vertical stress, the weight of the soil above"
+        + (
+            "."
+            if water is None
+            else f" less the pore pressure below the water table at elevation {water:g} m "
+            "(9.81 kN/m³)."
+        )
+    )

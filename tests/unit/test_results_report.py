@@ -1,0 +1,239 @@
+# SPDX-License-Identifier: MIT
+"""The report and all that is drawn for it: from the folder alone, for every kind of result."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from fenics_hytf.motion import intensity_measures
+from fenics_hytf.results import open_result, publish
+from fenics_hytf.results.conventions import method
+from tests.unit.results_builder import ROCK, make_result
+
+MOTION_X = ("histories_x", "transfer_x", "spectra_x", "fourier_x")
+PNG = b"\x89PNG\r\n\x1a\n"
+VOID = {"meta", "img"}
+
+
+class Page(HTMLParser):
+    """Checks that tags nest; collects text and attributes."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.text, self.attributes = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.attributes += attrs
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text.append(data)
+
+
+def text_of(result, folder):
+    with open_result(folder) as opened:
+        opened.write(result, publish)
+    page = Page((folder / "report.html").read_text(encoding="utf-8"))
+    return re.sub(r"\s+", " ", " ".join(page.text))
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        ({}, {"histories_x", "transfer_x", "spectra_x", "fourier_x", "convergence"}),
+        ({"compliant": True, "loop": False}, {"base_x", *MOTION_X}),
+        ({"loop": False, "kind": "box"}, {"section", *MOTION_X}),
+        (
+            {"directions": ("z",), "kind": "box"},
+            {"section", "convergence", "histories_z", "transfer_z", "spectra_z", "fourier_z"},
+        ),
+        (
+            {"directions": ("x", "z"), "gdim": 3, "kind": "box", "lapses": 3, "receivers": 9},
+            {"histories_x", "histories_z", "transfer_x_x", "transfer_z_z", "convergence"}
+            | {"spectra_x", "spectra_z", "fourier_x", "fourier_z"},
+        ),
+        ({"receivers": 0, "loop": False}, set()),
+    ],
+    ids=str,
+)
+def test_every_figure_and_the_report(tmp_path, case, expected):
+    expected = {"profiles", "profiles_peaks", *expected}
+    with open_result(tmp_path / "r") as folder:
+        folder.write(make_result(**case), publish)
+    assert {path.stem for path in (tmp_path / "r").glob("*.png")} == expected
+    for path in (tmp_path / "r").glob("*.png"):
+        assert path.read_bytes().startswith(PNG)
+        path.unlink()
+    (tmp_path / "r/report.html").unlink()
+    written = publish(tmp_path / "r")  # again, from CSV and JSON alone
+    assert {name.removesuffix(".png") for name in written} == {*expected, "report.html"}
+    page = Page((tmp_path / "r/report.html").read_text(encoding="utf-8"))
+    assert page.tags.count("img") == len(expected)
+    assert "script" not in page.tags and "link" not in page.tags
+    for name, value in page.attributes:
+        if name in ("src", "href"):  # nothing outside the page
+            assert value.startswith("data:image/png;base64,")
+    assert "None" not in " ".join(page.text) and not re.search(r"\bnan\b", " ".join(page.text))
+
+
+def test_texts_of_the_user_are_escaped(tmp_path):
+    title = '<script>alert("1")</script> & $\\alpha$'
+    soil = "<b>sand</b> $x_1$"
+    result = make_result(kind="box", loop=False)
+    data = dict(result.scene.data)
+    data["title"] = title
+    data["soil"] = {soil: data["soil"]["sand"], "fill": data["soil"]["fill"]}
+    mesh = dict(data["mesh"])
+    mesh["regions"] = [{"soil": soil, "below": 20.0}, {"soil": "fill"}]
+    data["mesh"] = mesh
+    scene = type(result.scene).from_dict(data)
+    result = replace(result, scene=scene, region_names=(soil, "fill"))
+    with open_result(tmp_path / "r") as folder:
+        folder.write(result, publish)
+    html = (tmp_path / "r/report.html").read_text(encoding="utf-8")
+    page = Page(html)
+    assert "script" not in page.tags and "b" not in page.tags
+    assert title in page.text and soil in page.text
+
+
+def test_the_report_tells_the_base_and_its_rock(tmp_path):
+    text = text_of(make_result(compliant=True), tmp_path / "r")
+    assert "The base is compliant" in text and "The input is an outcrop motion" in text
+    assert "density 2243.0 kg/m³, Vs 760.0 m/s, Poisson's ratio 0.25, damping 1 %" in text
+    assert re.search(r"outcrop \(the input\) x 0\.200 [^w]*within x 0\.140 ", text)
+    text = text_of(make_result(), tmp_path / "s")
+    assert "The base is rigid. The input is a within motion" in text
+    assert re.search(r"within \(the input\) x 0\.200 ", text) and "outcrop" not in text
+
+
+def test_the_report_tells_a_within_motion_above_rock(tmp_path):
+    result = make_result(boundary={"base": {"compliant": ROCK}})
+    text = text_of(result, tmp_path / "r")
+    assert "the base is held to it" in text and "to find the outcrop motion that belongs" in text
+
+
+@pytest.mark.parametrize(
+    ("case", "words"),
+    [
+        ({"solver": {"complex_modulus": "shake91"}}, "G* = G(1 − 2D² + 2iD√(1 − D²))"),
+        ({"solver": {"complex_modulus": "kramer"}}, "G* = G(1 − D² + 2iD)"),
+        ({"solver": {"keep": "bulk"}}, "the bulk modulus is kept and has no damping"),
+        (
+            {"effects": {"equivalent_linear": {"magnitude": 7.0}}},
+            "0.6 (from the magnitude, (M − 1)/10 with M = 7; Idriss and Sun, 1992)",
+        ),
+        ({"effects": {"rayleigh": {"alpha": 0.2, "beta": 1e-3}}, "loop": False}, "C = αM + βK"),
+        ({"loop": False}, "The soil is linear"),
+        ({"solver": {"max_frequency": 8.0}}, "up to 8 Hz, were solved"),
+        ({}, "up to 10 Hz, the Nyquist frequency, were solved. Lines are 0.0833 Hz apart"),
+        ({"boundary": {"left": "tied", "right": "tied"}}, "left and right tied to the opposite"),
+        ({"boundary": {"left": "roller"}}, "left held to the input's motion across the boundary"),
+        ({"boundary": {"left": "dashpot"}}, "left lined with dashpots (ρVp across and ρVs along"),
+        ({"boundary": {"left": "free_field"}}, "left joined by dashpots to level ground"),
+        ({"directions": ("z",), "kind": "box"}, "moves across its plane (SH waves)"),
+        ({"output": {"water_table": 20.0}}, "below the water table at elevation 20 m"),
+        ({"lapses": 3}, "cut into 3 lapses of 4 s"),
+        (
+            {"effects": {"calm": {"sides": ["left"], "thickness": 5.0, "damping": 0.3}}},
+            "Along left a layer 5 m thick absorbs waves: damping grows by up to 0.3",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_the_method_is_told_as_it_was(tmp_path, case, words):
+    with open_result(tmp_path / "r") as folder:
+        summary = folder.write(make_result(**case))
+    assert words in " ".join(method(summary))
+
+
+def test_the_report_tells_layers_iterations_and_intensity(tmp_path):
+    result = make_result()
+    text = text_of(result, tmp_path / "r")
+    # strain from 0.65 x 1e-4 x (1 + depth/6) at 0.5 and 3.5 m, and between 5 and 23 m
+    assert "fill 0 to 4 4 0.00704 to 0.0103 " in text and " 7.0e-04 yes" in text
+    assert "sand 4 to 24 10 0.0119 to 0.0314 " in text and " 2.0e-04 yes" in text
+    # the fourth iteration was worst in cell 7, in 15 m of 24
+    assert "4 7.0e-04 7 9 sand" in text
+    measures = intensity_measures(result.history("total_acceleration")[0, 0], result.dt)
+    assert f"r0 x 0.500 {measures.pgv:.3g}" in text and f"{measures.arias:.3g}" in text
+
+
+def test_what_has_not_converged_stands_out(tmp_path):
+    result = make_result(lapses=3)
+    lapse = result.lapses[1]
+    cells = replace(lapse.cells, change=np.where(lapse.cells.region == 0, 2e-3, 1e-4))
+    lapses = (result.lapses[0], replace(lapse, cells=cells), result.lapses[2])
+    text = text_of(replace(result, lapses=lapses), tmp_path / "r")
+    assert text.count(" 2.0e-03 NO") == 1 and text.count(" yes") == 5
+
+
+def test_what_rounding_leaves_of_no_motion_is_nought(tmp_path):
+    result = make_result()
+    lapse = result.lapses[0]
+    displacement = lapse.displacement.copy()
+    displacement[1] = 1e-17
+    result = replace(result, lapses=(replace(lapse, displacement=displacement),))
+    assert re.search(r"r1 0\.5, 16 x \S+ \S+ \S+ \S+ 0 ", text_of(result, tmp_path / "r"))
+
+
+@pytest.mark.parametrize(
+    ("curves", "words"),
+    [
+        (
+            {"model": "darendeli", "plasticity_index": 15, "mean_stress": 5e4, "ocr": 2},
+            "Darendeli, plasticity index 15 %, mean stress 50 kPa, OCR 2",
+        ),
+        ({"model": "seed_idriss_1970_mean"}, "Seed Idriss (1970), mean"),
+        (
+            {"model": "vucetic_dobry_1991", "plasticity_index": 30},
+            "Vucetic Dobry (1991), plasticity index 30 %",
+        ),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_curves_are_told_with_their_units(tmp_path, curves, words):
+    sand = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "curves": curves}
+    result = make_result(soil={"sand": sand, "fill": sand})
+    with open_result(tmp_path / "r") as folder:
+        assert folder.write(result)["scene"]["soils"]["sand"]["curves"] == words
+
+
+def test_receivers_that_figures_leave_out_are_told(tmp_path):
+    assert "6 of 9 receivers are shown" in text_of(make_result(receivers=9), tmp_path / "r")
+
+
+@pytest.mark.parametrize(
+    "case", [{"compliant": True}, {"kind": "box", "gdim": 3, "lapses": 3}], ids=str
+)
+def test_every_column_of_figures_has_its_unit(tmp_path, case):
+    with open_result(tmp_path / "r") as folder:
+        folder.write(make_result(**case), publish)
+    html = (tmp_path / "r/report.html").read_text(encoding="utf-8")
+    heads = re.findall(r"<th class=n>([^<]*)</th>", html)
+    without = {head for head in heads if not re.search(r"\[[^]]+\]$", head)}
+    # numbers that count or name, and times that carry their unit with them
+    assert without <= {"Lapse", "Iteration", "in cell", "Time"} and len(heads) > 40
+
+
+def test_the_report_tells_figures_with_their_digits(tmp_path):
+    with open_result(tmp_path / "r") as folder:
+        folder.write(make_result(), publish)
+    page = Page((tmp_path / "r/report.html").read_text(encoding="utf-8"))
+    text = " ".join(page.text)
+    # r0 moves with 2.5 times an input of 0.2 g, and by 15 mm; nothing moves in y
+    assert re.search(r"r0 0\.5, 24 x 0\.500 2\.50 0\.300 0\.00750 15\.0", text)
+    assert "Components that do not move are left out." in text
+    assert "darendeli" not in text and "table of 3 strains" in text
