@@ -66,7 +66,7 @@ def draw(scene: Scene, path: Path) -> str:
     if not count:
         return "no soil has any, no figure"
     # matplotlib takes half a second to load; a check without figure does without
-    from fenics_hytf.results.curves import draw_curves
+    from fenics_hytf.results.figures.curves import draw_curves
 
     draw_curves(scene.soil, path)
     return f"{path} ({count} soil{'s' if count > 1 else ''})"

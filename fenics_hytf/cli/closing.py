@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from fenics_hytf.motion import GRAVITY
+from fenics_hytf.results import moving_components
 
 _MOST = 12  # receivers listed
+_SMALLEST = 1e-6  # mm or g: less is rounding
 
 
 def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
@@ -36,24 +38,45 @@ def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
         change = lapses[-1]["final_change"]
         last = "" if change is None else f", last change {change:.1e}"
         rows.append(("iterations", f"{sum(iterations)}{last}"))
+    rows += _base(summary)
     rows += _peaks(summary)
     rows += [("warning", text) for text in summary["warnings"]]
     rows.append(("results", f"{folder / 'report.html' if plots else folder}"))
     return "\n".join([summary["title"], *(f"  {name:11s} {text}" for name, text in rows)])
 
 
+def _base(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Peaks of the base as within and outcrop motions, where both are known."""
+    return [
+        (
+            "base",
+            f"{direction}: outcrop {motions['outcrop_pga_g']:.3g} g, "
+            f"within {motions['within_pga_g']:.3g} g",
+        )
+        for direction, motions in summary["base"].items()
+        if motions["outcrop_pga_g"] is not None
+    ]
+
+
 def _peaks(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Peaks of the components that are driven, one row a receiver."""
+    """Peaks of the components that move, one row a receiver."""
     rows: list[tuple[str, str]] = []
-    driven = [c for c in summary["components"] if c in summary["directions"]]
     for name, peaks in list(summary["peaks"].items())[:_MOST]:
         text = "; ".join(
-            f"{c}: total acceleration {peaks[f'A_{c}'] / GRAVITY:.3g} g, "
-            f"displacement {1e3 * peaks[f'u_{c}']:.3g} mm"
-            for c in driven
+            f"{c}: total acceleration {_figure(peaks[f'A_{c}'], 1 / GRAVITY)} g, "
+            f"displacement {_figure(peaks[f'u_{c}'], 1e3)} mm"
+            for c in moving_components(summary, name)
         )
         rows.append(("peaks" if not rows else "", f"{name}  {text}"))
     left_out = len(summary["peaks"]) - len(rows)
     if left_out:
         rows.append(("", f"and {left_out} more receivers"))
     return rows
+
+
+def _figure(value: float | None, factor: float) -> str:
+    """A figure in other units; a receiver whose point has left the mesh has none."""
+    if value is None:
+        return "-"
+    scaled = factor * value
+    return f"{scaled:.3g}" if scaled >= _SMALLEST else "0"

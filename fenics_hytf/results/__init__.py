@@ -23,7 +23,7 @@ from fenics_hytf.results.reader import (
     read_table,
     read_tables,
 )
-from fenics_hytf.results.summary import summarise
+from fenics_hytf.results.summary import moving_components, summarise
 
 __all__ = [
     "FINISHED",
@@ -34,6 +34,7 @@ __all__ = [
     "describe_scene",
     "folder_faults",
     "locked",
+    "moving_components",
     "open_result",
     "publish",
     "read_result",

@@ -23,8 +23,8 @@ def publish(folder: Path, summary: dict[str, Any] | None = None) -> list[str]:
         ResultError: If the folder holds no finished result, or one that cannot be read.
     """
     # matplotlib takes half a second to load; runs without figures do without
-    from fenics_hytf.results.figures import draw_figures
-    from fenics_hytf.results.report import write_report
+    from fenics_hytf.results.figures.drawing import draw_figures
+    from fenics_hytf.results.report.document import write_report
 
     stored = read_result(folder, summary)
     drawings = draw_figures(stored)

@@ -13,8 +13,8 @@ from fenics_hytf.cli import main
 from fenics_hytf.cli.app import fill_plot
 from fenics_hytf.cli.check import check_scene
 from fenics_hytf.cli.outcome import RunRequest
-from fenics_hytf.results.curves import curve_figure
-from fenics_hytf.results.style import COLOURS, figure_style
+from fenics_hytf.results.figures.curves import curve_figure
+from fenics_hytf.results.figures.style import COLOURS, figure_style
 from fenics_hytf.scene.soil import read_soils
 
 SCENE = """

@@ -11,14 +11,15 @@ import pytest
 from matplotlib.colors import LogNorm
 
 from fenics_hytf.motion import GRAVITY, fourier_amplitude, smoothed
-from fenics_hytf.results import open_result, read_result, style
-from fenics_hytf.results.convergence import convergence
-from fenics_hytf.results.figures import all_figures
-from fenics_hytf.results.histories import base_motions, histories
-from fenics_hytf.results.profiles import peak_profiles, profiles
-from fenics_hytf.results.section import section
-from fenics_hytf.results.shown import shown_receivers, solved_band
-from fenics_hytf.results.spectra import (
+from fenics_hytf.results import open_result, read_result
+from fenics_hytf.results.figures import style
+from fenics_hytf.results.figures.convergence import convergence
+from fenics_hytf.results.figures.drawing import all_figures
+from fenics_hytf.results.figures.histories import base_motions, histories
+from fenics_hytf.results.figures.profiles import peak_profiles, profiles
+from fenics_hytf.results.figures.section import section
+from fenics_hytf.results.figures.shown import shown_receivers, solved_band
+from fenics_hytf.results.figures.spectra import (
     fourier_amplitudes,
     response_spectra,
     transfer_functions,

@@ -12,7 +12,7 @@ import pytest
 
 from fenics_hytf.motion import intensity_measures
 from fenics_hytf.results import open_result, publish
-from fenics_hytf.results.conventions import method
+from fenics_hytf.results.report.conventions import method
 from tests.unit.results_builder import ROCK, make_result
 
 MOTION_X = ("histories_x", "transfer_x", "spectra_x", "fourier_x")

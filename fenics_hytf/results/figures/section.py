@@ -20,7 +20,7 @@ from matplotlib.tri import Triangulation
 from scipy.spatial import Delaunay, QhullError
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results.profiles import cell_column, envelope, is_linear
+from fenics_hytf.results.figures.profiles import cell_column, envelope, is_linear
 from fenics_hytf.results.reader import StoredResult
 
 RealArray = npt.NDArray[np.floating[Any]]

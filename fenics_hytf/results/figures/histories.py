@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results import style
+from fenics_hytf.results.figures import style
+from fenics_hytf.results.figures.shown import input_kind, seams, shown_receivers
+from fenics_hytf.results.figures.spectra import period_axis
+from fenics_hytf.results.figures.style import COLOURS, INK, QUIET, label
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.shown import input_kind, seams, shown_receivers
-from fenics_hytf.results.spectra import period_axis
-from fenics_hytf.results.style import COLOURS, INK, QUIET, label
 
 RealArray = npt.NDArray[np.floating[Any]]
 

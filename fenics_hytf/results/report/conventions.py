@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results.markup import count, listed, number
+from fenics_hytf.results.report.markup import count, listed, number
 
 Summary = Mapping[str, Any]
 

@@ -12,21 +12,21 @@ from html import escape
 from typing import Any
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results.conventions import method
-from fenics_hytf.results.figures import Drawing
+from fenics_hytf.results.figures.drawing import Drawing
 from fenics_hytf.results.folder import replace_file
-from fenics_hytf.results.markup import number, paragraphs, section, text
-from fenics_hytf.results.page import STYLE
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.report_input import input_section
-from fenics_hytf.results.report_results import (
+from fenics_hytf.results.report.conventions import method
+from fenics_hytf.results.report.findings import (
     base_table,
     intensity_table,
     iterations_table,
     layers_table,
     peaks_table,
 )
-from fenics_hytf.results.report_work import work_section
+from fenics_hytf.results.report.input import input_section
+from fenics_hytf.results.report.markup import number, paragraphs, section, text
+from fenics_hytf.results.report.style import STYLE
+from fenics_hytf.results.report.work import work_section
 from fenics_hytf.results.summary import component_peaks
 
 Summary = Mapping[str, Any]

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fenics_hytf.results.markup import (
+from fenics_hytf.results.report.markup import (
     NOTHING,
     count,
     number,

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results.markup import NOTHING, number, power, span, table
 from fenics_hytf.results.reader import StoredResult
+from fenics_hytf.results.report.markup import NOTHING, number, power, span, table
 from fenics_hytf.results.summary import moving_components
 
 Summary = Mapping[str, Any]

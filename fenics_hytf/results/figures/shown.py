@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf.results.figures.style import MAX_LINES, chosen
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.style import MAX_LINES, chosen
 from fenics_hytf.results.summary import component_peaks
 
 RealArray = npt.NDArray[np.floating[Any]]

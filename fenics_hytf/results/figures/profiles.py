@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fenics_hytf.motion import GRAVITY
+from fenics_hytf.results.figures.style import COLOURS, MAX_LINES, QUIET, label, length_unit
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.style import COLOURS, MAX_LINES, QUIET, label, length_unit
 
 RealArray = npt.NDArray[np.floating[Any]]
 

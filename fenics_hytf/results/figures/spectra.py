@@ -12,9 +12,14 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from fenics_hytf.motion import GRAVITY, fourier_amplitude, smoothed
+from fenics_hytf.results.figures.shown import (
+    FEW_LINES,
+    input_kind,
+    shown_receivers,
+    transfer_column,
+)
+from fenics_hytf.results.figures.style import COLOURS, DASHED, INK, QUIET, label, legend
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.shown import FEW_LINES, input_kind, shown_receivers, transfer_column
-from fenics_hytf.results.style import COLOURS, DASHED, INK, QUIET, label, legend
 
 RealArray = npt.NDArray[np.floating[Any]]
 

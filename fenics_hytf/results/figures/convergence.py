@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from fenics_hytf.results.figures.style import COLOURS, DASHED, INK, MAX_LINES, QUIET, legend
 from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.style import COLOURS, DASHED, INK, MAX_LINES, QUIET, legend
 
 
 def convergence(stored: StoredResult) -> Figure:

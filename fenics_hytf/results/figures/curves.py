@@ -17,8 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from fenics_hytf.results import style
-from fenics_hytf.results.style import COLOURS, QUIET, label
+from fenics_hytf.results.figures import style
+from fenics_hytf.results.figures.style import COLOURS, QUIET, label
 from fenics_hytf.soil import Curve, LimitedCurve
 
 if TYPE_CHECKING:

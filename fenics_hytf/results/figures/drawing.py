@@ -8,13 +8,12 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from fenics_hytf.results import style
-from fenics_hytf.results.convergence import convergence
-from fenics_hytf.results.histories import base_motions, histories
-from fenics_hytf.results.profiles import caption, peak_profiles, profiles
-from fenics_hytf.results.reader import StoredResult
-from fenics_hytf.results.section import section
-from fenics_hytf.results.shown import (
+from fenics_hytf.results.figures import style
+from fenics_hytf.results.figures.convergence import convergence
+from fenics_hytf.results.figures.histories import base_motions, histories
+from fenics_hytf.results.figures.profiles import caption, peak_profiles, profiles
+from fenics_hytf.results.figures.section import section
+from fenics_hytf.results.figures.shown import (
     has_outcrop,
     has_transfer,
     input_kind,
@@ -23,11 +22,12 @@ from fenics_hytf.results.shown import (
     shown_components,
     solved_band,
 )
-from fenics_hytf.results.spectra import (
+from fenics_hytf.results.figures.spectra import (
     fourier_amplitudes,
     response_spectra,
     transfer_functions,
 )
+from fenics_hytf.results.reader import StoredResult
 
 
 @dataclass(frozen=True)

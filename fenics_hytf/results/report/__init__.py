@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""``report.html``, part by part: method, input, findings, computation."""
