@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fenics_hytf.scene.soil import Soil
 
 _MODEL = re.compile(r"([a-z]+(?:_[a-z]+)*)(?:_(\d{4}))?(?:_(\w+))?")
+_PAIRS = ("hardin_drnevich", "ishibashi_zhang", "seed_idriss", "vucetic_dobry")  # of authors
 _ACRONYMS = ("epri", "gei", "mkz", "ocr")
 _UNITS = {
     "plasticity_index": (1.0, " %"),
@@ -112,7 +113,8 @@ def _model(name: str) -> str:
     if match is None:
         return name.replace("_", " ")
     words, year, rest = match.groups()
-    who = " ".join(w.upper() if w in _ACRONYMS else w.capitalize() for w in words.split("_"))
+    joint = " and " if words in _PAIRS else " "
+    who = joint.join(w.upper() if w in _ACRONYMS else w.capitalize() for w in words.split("_"))
     which = "" if rest is None else f", {rest.replace('_', ' ')}"
     return who + ("" if year is None else f" ({year})") + which
 

@@ -112,11 +112,12 @@ def _key_figures(summary: Summary) -> str:
     layers = [layer for lapse in summary["lapses"] for layer in lapse["layers"]]
     strain = max((i["effective_strain"][1] or 0.0 for i in layers), default=0.0)
     stiffness = min((i["g_over_gmax"][0] or 1.0 for i in layers), default=1.0)
-    figures += [
-        ("largest effective strain", f"{number(100 * strain)} %"),
-        ("smallest G/Gmax", number(stiffness)),
-        ("base", str(summary["scene"]["boundary"].get("base", "rigid"))),
-    ]
+    if summary["scene"]["strain_ratio"] is None:
+        figures.append(("largest shear strain", f"{number(100 * strain)} %"))
+    else:
+        figures.append(("largest effective strain", f"{number(100 * strain)} %"))
+        figures.append(("smallest G/Gmax", number(stiffness)))
+    figures.append(("base", str(summary["scene"]["boundary"].get("base", "rigid"))))
     items = "".join(
         f"<div><strong>{text(value)}</strong><span>{text(name)}</span></div>"
         for name, value in figures
