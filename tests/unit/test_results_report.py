@@ -196,10 +196,10 @@ def test_what_rounding_leaves_of_no_motion_is_nought(tmp_path):
             {"model": "darendeli", "plasticity_index": 15, "mean_stress": 5e4, "ocr": 2},
             "Darendeli, plasticity index 15 %, mean stress 50 kPa, OCR 2",
         ),
-        ({"model": "seed_idriss_1970_mean"}, "Seed Idriss (1970), mean"),
+        ({"model": "seed_idriss_1970_mean"}, "Seed and Idriss (1970), mean"),
         (
             {"model": "vucetic_dobry_1991", "plasticity_index": 30},
-            "Vucetic Dobry (1991), plasticity index 30 %",
+            "Vucetic and Dobry (1991), plasticity index 30 %",
         ),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
