@@ -4,10 +4,12 @@
 from fenics_hytf.frequency.direct import Loads, SymmetricFactorisation, direct_sweep
 from fenics_hytf.frequency.errors import (
     FactorisationError,
+    ReductionError,
     ResidualError,
     ResonanceError,
     SweepError,
 )
+from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
 from fenics_hytf.frequency.sweep import DenseSweep, Sweep
 from fenics_hytf.frequency.system import (
     DynamicSystem,
@@ -22,6 +24,8 @@ __all__ = [
     "DynamicSystem",
     "FactorisationError",
     "Loads",
+    "ReducedSweep",
+    "ReductionError",
     "ResidualError",
     "ResonanceError",
     "ScalarFunction",
@@ -32,4 +36,5 @@ __all__ = [
     "direct_sweep",
     "hysteretic",
     "radiation",
+    "reduced_sweep",
 ]

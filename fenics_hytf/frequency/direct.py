@@ -177,6 +177,15 @@ class SymmetricFactorisation:
         if amplification > _RESONANCE:
             raise ResonanceError(self._s, amplification)
 
+    def backsolve(self, b: PETSc.Vec, x: PETSc.Vec) -> None:
+        """Solve A x = b with the factors as they are, whatever the residual.
+
+        Args:
+            b: Right-hand side.
+            x: Solution, overwritten.
+        """
+        self._solver.solve(b, x)
+
     def _true_residual(self, b: PETSc.Vec, x: PETSc.Vec) -> float:
         self.A.mult(x, self._residual)
         self._residual.aypx(-1.0, b)

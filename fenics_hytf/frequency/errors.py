@@ -5,6 +5,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+import numpy.typing as npt
+
 
 class SweepError(RuntimeError):
     """A line of the sweep could not be solved.
@@ -48,4 +51,25 @@ class ResidualError(SweepError):
             s,
             f"found a relative residual of {residual:.3g}; expected at most {tolerance:.3g}: the "
             "line may be an undamped resonance; add damping or loosen solver.tolerance",
+        )
+
+
+class ReductionError(SweepError):
+    """The reduced sweep used up its budget before every line was solved.
+
+    Attributes:
+        lines: Complex frequencies of the lines that are left [rad/s], shape ``(n,)``.
+    """
+
+    def __init__(
+        self, lines: npt.NDArray[np.complex128], residual: float, tolerance: float
+    ) -> None:
+        self.lines = lines
+        hertz = lines.imag / (2 * math.pi)
+        super().__init__(
+            complex(lines[0]),
+            f"found {len(lines)} lines from {hertz.min():.6g} to {hertz.max():.6g} Hz with "
+            f"relative residuals up to {residual:.3g}; expected at most {tolerance:.3g} within the "
+            "budget of factorisations: raise the budget, loosen the tolerance, or use the direct "
+            "sweep",
         )

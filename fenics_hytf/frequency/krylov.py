@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: MIT
+"""Blocks of directions that the solution of A(s) x = b takes near an expansion point.
+
+With A(s₀ + δ) = A₀ + δA₁ + δ²A₂ + ... the Taylor coefficients of x obey
+
+    A₀ x_k = b_k − A₁ x_{k−1} − A₂ x_{k−2} − ...
+
+so one factorisation of A₀ serves as many of them as are wanted. They are not used themselves, being
+nearly parallel, but an orthonormal basis of what they span, by two-level orthogonal Arnoldi on the
+linearised recurrence (Lu, Su and Bai 2016, SIAM J. Matrix Anal. Appl. 37(1), 195-214).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction
+
+ComplexArray = npt.NDArray[np.complex128]
+
+_CIRCLE = 0.3  # radius of the circle round an expansion point, over its distance from the real axis
+_NODES = 16  # on the circle: a function that is regular within three times it is exact to 1e-8
+_NOTHING = 1e-12  # of the largest coefficient
+
+
+class TermProducts:
+    """K_j X of each term of a system, for blocks X of this rank's rows.
+
+    Args:
+        system: The system.
+    """
+
+    def __init__(self, system: DynamicSystem) -> None:
+        self.functions = [function for _, function in system.terms]
+        self.comm: MPI.Comm = system.comm.tompi4py()
+        self._matrices = [matrix for matrix, _ in system.terms]
+        self._local = [_real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
+
+    def __len__(self) -> int:
+        return len(self.functions)
+
+    def __call__(self, term: int, X: ComplexArray) -> ComplexArray:
+        """K_j X.
+
+        Args:
+            term: j.
+            X: Shape ``(num_local, n)``.
+
+        Returns:
+            Shape ``(num_local, n)``.
+        """
+        if self._local:
+            pairs = np.ascontiguousarray(X).view(np.float64)
+            return np.ascontiguousarray(self._local[term] @ pairs).view(np.complex128)
+        matrix = self._matrices[term]
+        block = PETSc.Mat().createDense(
+            ((X.shape[0], None), (None, X.shape[1])),
+            array=np.asfortranarray(X),
+            comm=matrix.comm,
+        )
+        product = matrix.matMult(block)
+        result = product.getDenseArray().copy()
+        product.destroy()
+        block.destroy()
+        return np.asarray(result, np.complex128)
+
+
+def _real_rows(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """A real matrix without the zeros that only the common pattern holds."""
+    start, columns, values = matrix.getValuesCSR()
+    rows = sparse.csr_matrix((values.real.copy(), columns, start), shape=matrix.getSize())
+    rows.eliminate_zeros()
+    return rows
+
+
+def taylor(function: ScalarFunction, s: complex, order: int, radius: float) -> ComplexArray:
+    """Taylor coefficients of a function from its values on a circle (Cauchy's integral).
+
+    Args:
+        function: Regular within the circle.
+        s: Centre [rad/s].
+        order: Of the last coefficient, below 16.
+        radius: Of the circle [rad/s].
+
+    Returns:
+        Coefficients of (δ/radius)^k, shape ``(order + 1,)``.
+    """
+    circle = s + radius * np.exp(2j * np.pi * np.arange(_NODES) / _NODES)
+    values = np.array([function(complex(z)) for z in circle])
+    return np.asarray(np.fft.fft(values)[: order + 1] / _NODES)
+
+
+def krylov_block(
+    products: TermProducts,
+    solve: Callable[[ComplexArray], ComplexArray],
+    b: ComplexArray,
+    s: complex,
+    size: int,
+    order: int = 2,
+) -> ComplexArray:
+    """Orthonormal basis of the first Taylor coefficients of x about s.
+
+    Args:
+        products: The system's matrices.
+        solve: Solves A(s) x = b with the factorisation at ``s``.
+        b: This rank's part of the right-hand side, shape ``(num_local,)``.
+        s: Expansion point [rad/s]; on the real axis, where a hysteretic law is not regular, the
+            block is the solution alone.
+        size: Directions wanted.
+        order: Taylor coefficients of A that are used.
+
+    Returns:
+        Shape ``(num_local, size)``, or narrower where there are fewer.
+    """
+    radius = _CIRCLE * abs(s.imag)
+    steps = size if radius > 0 else 1
+    coefficients = [taylor(f, s, order, radius) for f in products.functions] if radius else []
+    comm = products.comm
+    first = solve(b)
+    length = _norm(comm, first)
+    Q = np.empty((len(b), steps), np.complex128, order="F")
+    if length == 0.0:
+        return Q[:, :0]
+    Q[:, 0] = first / length
+    # States of the recurrence (x_{k−1}, ..., x_{k−order}) in terms of Q, orthonormal as a whole.
+    states = np.zeros((steps, order, steps), np.complex128)
+    states[0, 0, 0] = 1.0
+    for k in range(1, steps):
+        pull = np.zeros(len(b), np.complex128)
+        for back in range(order):
+            x = Q[:, :k] @ states[k - 1, back, :k]
+            factors = np.array([c[back + 1] for c in coefficients])
+            for term in np.flatnonzero(abs(factors) > 0):
+                pull -= factors[term] * products(int(term), x[:, None])[:, 0]
+        w = solve(pull)
+        overlap, rest = _against(comm, Q[:, :k], w)
+        length = _norm(comm, rest)
+        if length <= _NOTHING * _norm(comm, w):
+            return Q[:, :k]
+        Q[:, k] = rest / length
+        state = np.zeros((order, steps), np.complex128)
+        state[0, :k], state[0, k] = overlap, length
+        state[1:] = states[k - 1, : order - 1]
+        for _ in range(2):
+            state -= np.einsum(
+                "l,lij->ij", np.einsum("lij,ij->l", states[:k].conj(), state), states[:k]
+            )
+        states[k] = state / np.linalg.norm(state)
+    return Q
+
+
+def _against(comm: MPI.Comm, Q: ComplexArray, w: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+    """Overlap of w with an orthonormal basis, and what is left of it."""
+    overlap = comm.allreduce(Q.conj().T @ w)
+    rest = w - Q @ overlap
+    again = comm.allreduce(Q.conj().T @ rest)
+    return overlap + again, rest - Q @ again
+
+
+def _norm(comm: MPI.Comm, x: ComplexArray) -> float:
+    return float(np.sqrt(comm.allreduce(float(np.vdot(x, x).real))))

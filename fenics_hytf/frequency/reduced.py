@@ -1,0 +1,340 @@
+# SPDX-License-Identifier: MIT
+"""The reduced sweep: Galerkin projection on few directions, grown where the residual is worst.
+
+x(s) ≈ V y(s) with (Σ f_j(s) VᴴK_jV) y = Vᴴb. V comes from Krylov blocks at a few expansion points,
+each one factorisation; Vᴴ and not Vᵀ, so that the reduced matrix of a damped system is regular. The
+residual of every line is judged from a sketch: a few hundred signed sums of its entries, of which
+the norm is right to some per cent (Clarkson and Woodruff 2013); the worst lines are then judged by
+their true residuals. Memory is V and some small matrices, whatever the number of lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+from scipy import sparse
+from scipy.linalg.blas import zgemm
+
+from fenics_hytf.frequency.direct import SymmetricFactorisation
+from fenics_hytf.frequency.errors import ReductionError
+from fenics_hytf.frequency.krylov import TermProducts, krylov_block
+from fenics_hytf.frequency.system import DynamicSystem
+
+ComplexArray = npt.NDArray[np.complex128]
+RealArray = npt.NDArray[np.float64]
+
+_SKETCH = 600  # sums; their norm is off by 1/√600 or so
+_MARGIN = 0.5  # sketched residuals stay below this fraction of the tolerance
+_STRIDE = 4  # lines of the first check: every fourth
+_DROP = 1e-8  # directions that a block has in common with the basis but for this are dropped
+_WORST = 5  # lines whose true residual is taken at the end
+_LINES = 64  # reduced systems solved at once
+
+
+@dataclass(frozen=True)
+class ReducedSweep:
+    """A sweep held as a basis and reduced coordinates; see :class:`Sweep`.
+
+    Attributes:
+        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+        residuals: Relative residuals [-], shape ``(num_lines, num_sides)``: true ones of the worst
+            lines, sketched ones, right to some per cent, of the others.
+        factorisations: Matrices factorised.
+        solves: Solves with them.
+        basis: V on this rank, orthonormal, shape ``(num_local, size)``.
+        coordinates: y, shape ``(size, num_sides, num_lines)``.
+        expansions: Lines at which a matrix was factorised.
+        comm: Communicator.
+    """
+
+    s: ComplexArray
+    residuals: RealArray
+    factorisations: int
+    solves: int
+    basis: ComplexArray
+    coordinates: ComplexArray
+    expansions: tuple[int, ...]
+    comm: PETSc.Comm
+
+    def solution(self, k: int) -> ComplexArray:
+        """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
+        return self.basis @ self.coordinates[:, :, k]
+
+    def project(self, rows: PETSc.Mat) -> ComplexArray:
+        """Multiply every solution by a matrix; see :class:`Sweep`."""
+        _, num_sides, num_lines = self.coordinates.shape
+        seen = _multiply(rows, self.basis)
+        return (seen @ self.coordinates.reshape(len(self.coordinates), -1)).reshape(
+            len(seen), num_sides, num_lines
+        )
+
+    def combine(self, weights: ComplexArray) -> ComplexArray:
+        """Sum all solutions with weights; see :class:`Sweep`."""
+        return self.basis @ np.einsum("rsl,sl->r", self.coordinates, weights)
+
+
+def reduced_sweep(
+    system: DynamicSystem,
+    b: PETSc.Vec | Sequence[PETSc.Vec],
+    s: npt.ArrayLike,
+    tolerance: float = 1e-6,
+    progress: Callable[[int, int], None] | None = None,
+    expansions: Sequence[int] = (),
+    budget: int | None = None,
+    block: int = 10,
+) -> ReducedSweep:
+    """Solve A(s) x = b at every frequency by projection on a basis that grows as needed.
+
+    Args:
+        system: The system; its matrices are real.
+        b: Right-hand side, or several.
+        s: Complex frequencies η + iω [rad/s], shape ``(num_lines,)``.
+        tolerance: Relative residual that every line must reach [-].
+        progress: Called with the lines that have reached it and their number.
+        expansions: Lines to begin with, such as those of a sweep of a system much like this one.
+        budget: Factorisations allowed; one a line if ``None``.
+        block: Directions a factorisation is used for at first.
+
+    Returns:
+        The sweep.
+
+    Raises:
+        ReductionError: Lines that did not reach the tolerance within the budget.
+        FactorisationError: A(s) is singular at an expansion point.
+    """
+    sides = [b] if isinstance(b, PETSc.Vec) else list(b)
+    lines = np.atleast_1d(np.asarray(s, np.complex128))
+    allowed = len(lines) if budget is None else budget
+    with SymmetricFactorisation(system) as factorisation:
+        growth = _Growth(system, factorisation, sides, lines, tolerance)
+        wanted = list(expansions) or ([len(lines) // 2] if len(lines) else [])
+        size = block
+        while wanted:
+            if len(growth.expansions) >= allowed:
+                raise ReductionError(lines[growth.pending], growth.worst, tolerance)
+            growth.expand(wanted.pop(0), size)
+            if not wanted:
+                growth.check()
+                if progress is not None:
+                    progress(len(lines) - len(growth.pending), len(lines))
+                wanted, size = growth.next_expansion(block)
+        return growth.result()
+
+
+class _Growth:
+    """The basis, what the system looks like on it, and how well each line is solved."""
+
+    def __init__(
+        self,
+        system: DynamicSystem,
+        factorisation: SymmetricFactorisation,
+        sides: list[PETSc.Vec],
+        lines: ComplexArray,
+        tolerance: float,
+    ) -> None:
+        self._factorisation = factorisation
+        self._products = TermProducts(system)
+        self._comm = self._products.comm
+        self._lines, self._tolerance = lines, tolerance
+        self._vectors = system.mass.createVecs()
+        self._b = np.stack([side.array_r for side in sides], axis=1)
+        self._load = np.maximum([side.norm() for side in sides], np.finfo(float).tiny)
+        count = len(self._b)
+        self._V: ComplexArray = np.empty((count, 0), np.complex128, order="F")
+        self._reduced_load = np.empty((0, len(sides)), np.complex128)
+        self._sketch = _sketch_matrix(count, self._comm.rank)
+        self._factors = np.array(
+            [[function(complex(z)) for z in lines] for function in self._products.functions]
+        )
+        terms = len(self._products)
+        self._reduced = [np.empty((0, 0), np.complex128)] * terms
+        self._sketched = [np.empty((_SKETCH, 0), np.complex128)] * terms
+        self._sketched_load = self._comm.allreduce(_times(self._sketch, self._b))
+        self.residuals = np.full((len(lines), len(sides)), np.inf)
+        self.expansions: list[int] = []
+        self.solves = 0
+        self._coarse = True
+        self._checked = np.arange(0, len(lines), _STRIDE)
+        self.pending = self._checked
+
+    @property
+    def worst(self) -> float:
+        """Largest residual of the lines that were checked."""
+        return float(self.residuals[self._checked].max(initial=0.0))
+
+    def expand(self, line: int, size: int) -> None:
+        """Factorise at a line and take the directions found there into the basis."""
+        s = complex(self._lines[line])
+        self._factorisation.factorise(s)
+        self.expansions.append(line)
+        for side in range(self._b.shape[1]):
+            found = krylov_block(self._products, self._solve, self._b[:, side], s, size)
+            self._take(found)
+
+    def _solve(self, right: ComplexArray) -> ComplexArray:
+        x, b = self._vectors
+        b.array[:] = right
+        self._factorisation.backsolve(b, x)
+        self.solves += 1
+        return x.array_r.copy()
+
+    def _take(self, found: ComplexArray) -> None:
+        """Add what is new in a block to the basis."""
+        fresh = found
+        for _ in range(2):
+            fresh = fresh - self._V @ self._inner(self._V, fresh)
+            fresh = self._orthonormalise(fresh)
+        if not fresh.shape[1]:
+            return
+        old = self._V.shape[1]
+        self._V = np.asfortranarray(np.concatenate([self._V, fresh], axis=1))
+        mine = self._inner(fresh, self._b)
+        self._reduced_load = np.concatenate([self._reduced_load, mine])
+        for term in range(len(self._products)):
+            image = np.asfortranarray(self._products(term, fresh))
+            border = self._inner(self._V, image)
+            grown = np.empty((len(border), len(border)), np.complex128)
+            grown[:old, :old] = self._reduced[term]
+            grown[:, old:] = border
+            grown[old:, :old] = border[:old].conj().T  # K_j is real and symmetric
+            self._reduced[term] = grown
+            sketched = self._comm.allreduce(_times(self._sketch, image))
+            self._sketched[term] = np.concatenate([self._sketched[term], sketched], axis=1)
+
+    def _inner(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+        if not left.shape[1]:
+            return np.empty((0, right.shape[1]), np.complex128)
+        product = zgemm(1.0, left, np.asfortranarray(right), trans_a=2)
+        return np.asarray(self._comm.allreduce(product))
+
+    def _orthonormalise(self, block: ComplexArray) -> ComplexArray:
+        """Principal directions of a block that are more than round-off."""
+        block = np.asfortranarray(block)
+        power, directions = np.linalg.eigh(self._inner(block, block))
+        kept = power > _DROP**2
+        return block @ (directions[:, kept] / np.sqrt(power[kept]))
+
+    def check(self) -> None:
+        """Judge the lines that had not reached the tolerance; every line before the end."""
+        self._judge(self.pending)
+        self._sift()
+        if not len(self.pending) and self._coarse:
+            self._coarse = False
+            self._checked = np.arange(len(self._lines))
+            self._judge(self._checked)
+            self._sift()
+        if not len(self.pending):
+            self._judge(self._checked)  # with the whole basis
+            self._judge_truly()
+            self._sift(1.0)
+
+    def _sift(self, fraction: float = _MARGIN) -> None:
+        above = self.residuals[self._checked].max(axis=1, initial=0.0) > fraction * self._tolerance
+        self.pending = self._checked[above]
+
+    def _judge(self, lines: npt.NDArray[np.intp]) -> None:
+        for start in range(0, len(lines), _LINES):
+            some = lines[start : start + _LINES]
+            y = self._coordinates(some)
+            left = np.broadcast_to(
+                self._sketched_load[:, :, None], (*self._sketched_load.shape, len(some))
+            ).copy()
+            for factors, seen in zip(self._factors, self._sketched, strict=True):
+                left -= np.einsum("ir,rsl->isl", seen, y, optimize=True) * factors[some]
+            self.residuals[some] = (np.linalg.norm(left, axis=0) / self._load[:, None]).T
+
+    def _coordinates(self, lines: npt.NDArray[np.intp]) -> ComplexArray:
+        """Y of some lines, shape ``(size, num_sides, len(lines))``."""
+        A = np.tensordot(self._factors[:, lines], np.stack(self._reduced), axes=(0, 0))
+        right = np.broadcast_to(self._reduced_load, (len(lines), *self._reduced_load.shape))
+        return np.asarray(np.linalg.solve(A, right).transpose(1, 2, 0))
+
+    def _judge_truly(self) -> None:
+        """True residuals of the worst lines."""
+        worst = np.argsort(self.residuals.max(axis=1))[-_WORST:]
+        y = self._coordinates(worst)
+        for number, line in enumerate(worst):
+            left = self._b.copy()
+            x = self._V @ y[:, :, number]
+            for term in range(len(self._products)):
+                left -= self._factors[term, line] * self._products(term, x)
+            power = self._comm.allreduce(np.sum(np.abs(left) ** 2, axis=0))
+            self.residuals[line] = np.sqrt(power) / self._load
+
+    def next_expansion(self, block: int) -> tuple[list[int], int]:
+        """Where to expand next, if anywhere, and in how many directions.
+
+        The centre, by log residual, of the lines round the worst one that are not done yet.
+        """
+        if not len(self.pending):
+            return [], 0
+        target = _MARGIN * self._tolerance
+        excess = np.log10(np.maximum(self.residuals[self._checked].max(axis=1) / target, 1.0))
+        peak = int(np.argmax(excess))
+        done = np.flatnonzero(excess == 0)
+        first = done[done < peak].max(initial=-1) + 1
+        last = done[done > peak].min(initial=len(excess))
+        weights = excess[first:last]
+        centre = round(float(weights @ np.arange(first, last) / weights.sum()))
+        line = int(self._checked[centre])
+        if line in self.expansions:
+            line = int(self._checked[peak])
+        if line in self.expansions:  # the sketch may be off there: any other line that is left
+            others = [int(k) for k in self.pending if int(k) not in self.expansions]
+            line = others[0] if others else line
+        return [line], int(np.clip(2 * excess[peak] + 1, 4, block))
+
+    def result(self) -> ReducedSweep:
+        """The sweep as it stands."""
+        everything = np.arange(len(self._lines))
+        shape = (self._V.shape[1], self._b.shape[1], 0)
+        parts = [
+            self._coordinates(everything[start : start + _LINES])
+            for start in range(0, len(everything), _LINES)
+        ]
+        y = np.concatenate(parts, axis=2) if parts else np.empty(shape, np.complex128)
+        for vector in self._vectors:
+            vector.destroy()
+        return ReducedSweep(
+            self._lines,
+            self.residuals,
+            self._factorisation.factorisations,
+            self.solves,
+            self._V,
+            y,
+            tuple(self.expansions),
+            self._factorisation.A.comm,
+        )
+
+
+def _sketch_matrix(count: int, rank: int) -> sparse.csr_matrix:
+    """Two signs a column of this rank's rows, each in a sum of its own."""
+    random = np.random.default_rng([2013, rank])
+    sums = random.integers(0, _SKETCH, size=(count, 2))
+    signs = random.choice([-1.0, 1.0], size=(count, 2)) / np.sqrt(2.0)
+    columns = np.repeat(np.arange(count), 2)
+    return sparse.csr_matrix((signs.ravel(), (sums.ravel(), columns)), shape=(_SKETCH, count))
+
+
+def _times(matrix: sparse.csr_matrix, block: ComplexArray) -> ComplexArray:
+    """A real sparse matrix times a complex block."""
+    pairs = np.ascontiguousarray(block).view(np.float64)
+    return np.ascontiguousarray(matrix @ pairs).view(np.complex128)
+
+
+def _multiply(rows: PETSc.Mat, block: ComplexArray) -> ComplexArray:
+    """This rank's rows of a matrix times the block that all ranks hold parts of."""
+    dense = PETSc.Mat().createDense(
+        ((block.shape[0], None), (None, block.shape[1])),
+        array=np.asfortranarray(block),
+        comm=rows.comm,
+    )
+    product = rows.matMult(dense)
+    result = product.getDenseArray().copy()
+    product.destroy()
+    dense.destroy()
+    return np.asarray(result, np.complex128)
