@@ -145,7 +145,7 @@ class _Growth:
         self._load = np.maximum([side.norm() for side in sides], np.finfo(float).tiny)
         count = len(self._b)
         self._V: ComplexArray = np.empty((count, 0), np.complex128, order="F")
-        self._reduced_load = np.empty((0, len(sides)), np.complex128)
+        self._reduced_load: ComplexArray = np.empty((0, len(sides)), np.complex128)
         self._sketch = _sketch_matrix(count, self._comm.rank)
         self._factors = np.array(
             [[function(complex(z)) for z in lines] for function in self._products.functions]
