@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sweeps over frequencies of an affine complex symmetric system."""
 
-from fenics_hytf.frequency.direct import Loads, SymmetricFactorisation, direct_sweep
+from fenics_hytf.frequency.direct import SymmetricFactorisation, direct_sweep
 from fenics_hytf.frequency.errors import (
     FactorisationError,
     ReductionError,
@@ -9,6 +9,7 @@ from fenics_hytf.frequency.errors import (
     ResonanceError,
     SweepError,
 )
+from fenics_hytf.frequency.loads import Loads
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
 from fenics_hytf.frequency.sweep import DenseSweep, Sweep
 from fenics_hytf.frequency.system import (

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
 from fenics_hytf.frequency.errors import FactorisationError, ResidualError, ResonanceError
+from fenics_hytf.frequency.loads import Loads
 from fenics_hytf.frequency.sweep import DenseSweep
 from fenics_hytf.frequency.system import DynamicSystem
 
@@ -195,16 +195,6 @@ class SymmetricFactorisation:
         self._solver.solve(self._residual, self._correction)
         x.axpy(1.0, self._correction)
         return self._true_residual(b, x)
-
-
-class Loads(Protocol):
-    """Right-hand sides that differ from line to line."""
-
-    def __len__(self) -> int:
-        """How many a line has."""
-
-    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
-        """Return those of a line by its number, borrowed until the next call."""
 
 
 def direct_sweep(

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 from scipy.linalg.blas import zgemm
@@ -22,6 +23,7 @@ from scipy.linalg.blas import zgemm
 from fenics_hytf.frequency.direct import SymmetricFactorisation
 from fenics_hytf.frequency.errors import ReductionError
 from fenics_hytf.frequency.krylov import TermProducts, krylov_block
+from fenics_hytf.frequency.loads import LoadFactors, Loads, factor_loads
 from fenics_hytf.frequency.system import DynamicSystem
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -32,6 +34,7 @@ _MARGIN = 0.5  # sketched residuals stay below this fraction of the tolerance
 _STRIDE = 4  # lines of the first check: every fourth
 _DROP = 1e-8  # directions that a block has in common with the basis but for this are dropped
 _WORST = 5  # lines whose true residual is taken at the end
+_LOAD_ERROR = 1e-3  # of the tolerance: what may be left of a load that differs between lines
 _LINES = 64  # reduced systems solved at once
 
 
@@ -79,7 +82,7 @@ class ReducedSweep:
 
 def reduced_sweep(
     system: DynamicSystem,
-    b: PETSc.Vec | Sequence[PETSc.Vec],
+    b: PETSc.Vec | Sequence[PETSc.Vec] | Loads,
     s: npt.ArrayLike,
     tolerance: float = 1e-6,
     progress: Callable[[int, int], None] | None = None,
@@ -91,7 +94,7 @@ def reduced_sweep(
 
     Args:
         system: The system; its matrices are real.
-        b: Right-hand side, or several.
+        b: Right-hand side, or several; or what gives those of each line.
         s: Complex frequencies η + iω [rad/s], shape ``(num_lines,)``.
         tolerance: Relative residual that every line must reach [-].
         progress: Called with the lines that have reached it and their number.
@@ -106,11 +109,12 @@ def reduced_sweep(
         ReductionError: Lines that did not reach the tolerance within the budget.
         FactorisationError: A(s) is singular at an expansion point.
     """
-    sides = [b] if isinstance(b, PETSc.Vec) else list(b)
     lines = np.atleast_1d(np.asarray(s, np.complex128))
     allowed = len(lines) if budget is None else budget
     with SymmetricFactorisation(system) as factorisation:
-        growth = _Growth(system, factorisation, sides, lines, tolerance)
+        comm = system.comm.tompi4py()
+        loads = factor_loads(b, len(lines), comm, _LOAD_ERROR * tolerance)
+        growth = _Growth(system, factorisation, loads, lines, tolerance)
         wanted = list(expansions) or ([len(lines) // 2] if len(lines) else [])
         size = block
         while wanted:
@@ -132,7 +136,7 @@ class _Growth:
         self,
         system: DynamicSystem,
         factorisation: SymmetricFactorisation,
-        sides: list[PETSc.Vec],
+        loads: LoadFactors,
         lines: ComplexArray,
         tolerance: float,
     ) -> None:
@@ -141,11 +145,10 @@ class _Growth:
         self._comm = self._products.comm
         self._lines, self._tolerance = lines, tolerance
         self._vectors = system.mass.createVecs()
-        self._b = np.stack([side.array_r for side in sides], axis=1)
-        self._load = np.maximum([side.norm() for side in sides], np.finfo(float).tiny)
-        count = len(self._b)
+        self._loads = loads
+        count, num_loads = loads.vectors.shape
         self._V: ComplexArray = np.empty((count, 0), np.complex128, order="F")
-        self._reduced_load: ComplexArray = np.empty((0, len(sides)), np.complex128)
+        self._reduced_load: ComplexArray = np.empty((0, num_loads), np.complex128)
         self._sketch = _sketch_matrix(count, self._comm.rank)
         self._factors = np.array(
             [[function(complex(z)) for z in lines] for function in self._products.functions]
@@ -153,8 +156,8 @@ class _Growth:
         terms = len(self._products)
         self._reduced = [np.empty((0, 0), np.complex128)] * terms
         self._sketched = [np.empty((_SKETCH, 0), np.complex128)] * terms
-        self._sketched_load = self._comm.allreduce(_times(self._sketch, self._b))
-        self.residuals = np.full((len(lines), len(sides)), np.inf)
+        self._sketched_load = self._comm.allreduce(_times(self._sketch, loads.vectors))
+        self.residuals = np.full(loads.norms.shape, np.inf)
         self.expansions: list[int] = []
         self.solves = 0
         self._coarse = True
@@ -171,9 +174,9 @@ class _Growth:
         s = complex(self._lines[line])
         self._factorisation.factorise(s)
         self.expansions.append(line)
-        for side in range(self._b.shape[1]):
-            found = krylov_block(self._products, self._solve, self._b[:, side], s, size)
-            self._take(found)
+        for b, steps in ((self._loads.at(line), size), (self._loads.slope(line), size // 2)):
+            for side in np.flatnonzero(self._comm.allreduce(np.any(b, axis=0), MPI.LOR)):
+                self._take(krylov_block(self._products, self._solve, b[:, side], s, steps))
 
     def _solve(self, right: ComplexArray) -> ComplexArray:
         x, b = self._vectors
@@ -192,7 +195,7 @@ class _Growth:
             return
         old = self._V.shape[1]
         self._V = np.asfortranarray(np.concatenate([self._V, fresh], axis=1))
-        mine = self._inner(fresh, self._b)
+        mine = self._inner(fresh, self._loads.vectors)
         self._reduced_load = np.concatenate([self._reduced_load, mine])
         for term in range(len(self._products)):
             image = np.asfortranarray(self._products(term, fresh))
@@ -240,30 +243,29 @@ class _Growth:
         for start in range(0, len(lines), _LINES):
             some = lines[start : start + _LINES]
             y = self._coordinates(some)
-            left = np.broadcast_to(
-                self._sketched_load[:, :, None], (*self._sketched_load.shape, len(some))
-            ).copy()
+            left = np.tensordot(self._sketched_load, self._loads.coordinates[:, :, some], axes=1)
             for factors, seen in zip(self._factors, self._sketched, strict=True):
-                left -= np.einsum("ir,rsl->isl", seen, y, optimize=True) * factors[some]
-            self.residuals[some] = (np.linalg.norm(left, axis=0) / self._load[:, None]).T
+                left -= np.tensordot(seen, y, axes=1) * factors[some]
+            self.residuals[some] = np.linalg.norm(left, axis=0).T / self._loads.norms[some]
 
     def _coordinates(self, lines: npt.NDArray[np.intp]) -> ComplexArray:
         """Y of some lines, shape ``(size, num_sides, len(lines))``."""
         A = np.tensordot(self._factors[:, lines], np.stack(self._reduced), axes=(0, 0))
-        right = np.broadcast_to(self._reduced_load, (len(lines), *self._reduced_load.shape))
-        return np.asarray(np.linalg.solve(A, right).transpose(1, 2, 0))
+        right = np.tensordot(self._reduced_load, self._loads.coordinates[:, :, lines], axes=1)
+        y = np.linalg.solve(A, right.transpose(2, 0, 1))
+        return np.asarray(y.transpose(1, 2, 0))
 
     def _judge_truly(self) -> None:
         """True residuals of the worst lines."""
         worst = np.argsort(self.residuals.max(axis=1))[-_WORST:]
         y = self._coordinates(worst)
         for number, line in enumerate(worst):
-            left = self._b.copy()
+            left = self._loads.at(int(line))
             x = self._V @ y[:, :, number]
             for term in range(len(self._products)):
                 left -= self._factors[term, line] * self._products(term, x)
             power = self._comm.allreduce(np.sum(np.abs(left) ** 2, axis=0))
-            self.residuals[line] = np.sqrt(power) / self._load
+            self.residuals[line] = np.sqrt(power) / self._loads.norms[line]
 
     def next_expansion(self, block: int) -> tuple[list[int], int]:
         """Where to expand next, if anywhere, and in how many directions.
@@ -291,7 +293,7 @@ class _Growth:
     def result(self) -> ReducedSweep:
         """The sweep as it stands."""
         everything = np.arange(len(self._lines))
-        shape = (self._V.shape[1], self._b.shape[1], 0)
+        shape = (self._V.shape[1], self._loads.norms.shape[1], 0)
         parts = [
             self._coordinates(everything[start : start + _LINES])
             for start in range(0, len(everything), _LINES)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: MIT
+"""Right-hand sides of all lines as a few vectors: b(s_k) = W c_k.
+
+Loads that differ from line to line come from motions that vary smoothly with frequency, such as
+those of level ground beyond a side; a few dozen vectors hold hundreds of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+class Loads(Protocol):
+    """Right-hand sides that differ from line to line."""
+
+    def __len__(self) -> int:
+        """How many a line has."""
+
+    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
+        """Return those of a line by its number, borrowed until the next call."""
+
+
+@dataclass(frozen=True)
+class LoadFactors:
+    """b of every line and side as combinations of a few vectors.
+
+    Attributes:
+        vectors: W on this rank, shape ``(num_local, n)``.
+        coordinates: c, shape ``(n, num_sides, num_lines)``.
+        norms: Of the loads, shape ``(num_lines, num_sides)``; 1 where a load is nought.
+    """
+
+    vectors: ComplexArray
+    coordinates: ComplexArray
+    norms: npt.NDArray[np.float64]
+
+    def at(self, line: int) -> ComplexArray:
+        """B of a line on this rank, shape ``(num_local, num_sides)``."""
+        return self.vectors @ self.coordinates[:, :, line]
+
+    def slope(self, line: int) -> ComplexArray:
+        """Change of b from line to line, likewise; nought where all lines are alike."""
+        c = self.coordinates
+        before, after = max(line - 1, 0), min(line + 1, c.shape[2] - 1)
+        return self.vectors @ (c[:, :, after] - c[:, :, before])
+
+
+def factor_loads(
+    b: PETSc.Vec | Sequence[PETSc.Vec] | Loads, num_lines: int, comm: MPI.Comm, tolerance: float
+) -> LoadFactors:
+    """Find the vectors that hold all loads (collective).
+
+    Args:
+        b: One or several right-hand sides, or those of each line.
+        num_lines: Number of lines.
+        comm: Communicator of the vectors.
+        tolerance: What may be left of a load, relative [-].
+
+    Returns:
+        The factors.
+    """
+    if callable(b):
+        return _gathered(b, num_lines, comm, tolerance)
+    sides = [b] if isinstance(b, PETSc.Vec) else list(b)
+    vectors = np.stack([side.array_r for side in sides], axis=1)
+    every = np.broadcast_to(np.eye(len(sides))[:, :, None], (len(sides), len(sides), num_lines))
+    norms = np.broadcast_to([side.norm() or 1.0 for side in sides], (num_lines, len(sides)))
+    return LoadFactors(vectors.astype(np.complex128), every.astype(np.complex128), norms)
+
+
+def _gathered(loads: Loads, num_lines: int, comm: MPI.Comm, tolerance: float) -> LoadFactors:
+    """Gram and Schmidt, line by line: a load that the vectors do not hold becomes one."""
+    vectors: list[ComplexArray] = []
+    norms = np.ones((num_lines, len(loads)))
+    found: list[list[ComplexArray]] = []
+    for line in range(num_lines):
+        found.append([])
+        for side, load in enumerate(loads(line)):
+            rest, length = load.array_r.copy(), load.norm()
+            norms[line, side] = length or 1.0
+            c: ComplexArray = np.zeros(len(vectors), np.complex128)
+            W = np.stack(vectors, axis=1) if vectors else np.empty((len(rest), 0), np.complex128)
+            for _ in range(2):
+                overlap = comm.allreduce(W.conj().T @ rest)
+                rest -= W @ overlap
+                c += overlap
+            left = float(np.sqrt(comm.allreduce(float(np.vdot(rest, rest).real))))
+            if left > tolerance * norms[line, side]:
+                vectors.append(rest / left)
+                c = np.append(c, left)
+            found[-1].append(c)
+    coordinates = np.zeros((len(vectors), len(loads), num_lines), np.complex128)
+    for line, sides in enumerate(found):
+        for side, c in enumerate(sides):
+            coordinates[: len(c), side, line] = c
+    return LoadFactors(np.stack(vectors, axis=1), coordinates, norms)
