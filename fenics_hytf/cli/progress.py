@@ -33,7 +33,9 @@ class Estimate:
         self._iterations = 0
 
     def update(self, progress: Progress) -> None:
-        """Take in a report."""
+        """Take in a report; the free field of a side takes next to no time."""
+        if progress.side:
+            return
         within = progress.done / progress.total if progress.total else 0.0
         if progress.phase == "lapse":
             within = 1.0
@@ -56,6 +58,8 @@ class Estimate:
 def describe(progress: Progress) -> str:
     """A report in words."""
     parts = [f"lapse {progress.lapse} ({progress.lapse + 1} of {progress.num_lapses})"]
+    if progress.side:
+        parts.append(f"free field at {progress.side}")
     if progress.phase == "lapse":
         parts.append("done")
     elif progress.iteration:
@@ -94,7 +98,8 @@ class PlainLines:
         self._estimate.update(progress)
         now = self._clock()
         ends = progress.phase == "lapse" and progress.lapse + 1 == progress.num_lapses
-        if progress.phase == "iteration" or ends or now - self._last >= 1.0:
+        iterated = progress.phase == "iteration" and not progress.side
+        if iterated or ends or now - self._last >= 1.0:
             self._last = now
             left = "" if ends else duration(self._estimate.seconds_left)
             text = ", ".join(part for part in (describe(progress), left) if part)

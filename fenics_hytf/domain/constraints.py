@@ -87,10 +87,13 @@ def normal_axis(domain: Domain, name: str) -> int:
         Number of the axis.
 
     Raises:
-        SceneError: The boundary is not parallel to an axis.
+        SceneError: On every rank: there is no such boundary, or it is not parallel to an axis.
     """
     places = domain.V.tabulate_dof_coordinates()[boundary_nodes(domain, name), : domain.gdim]
     everyone = np.concatenate(domain.comm.allgather(places))
+    if not len(everyone):
+        known = ", ".join(domain.boundaries)
+        raise SceneError([Fault(f"boundary.{name}", "no such boundary in the mesh", known)])
     extent = np.ptp(everyone, axis=0)
     axis = int(np.argmin(extent))
     if extent[axis] > 1e-9 * extent.max():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.mesh import entities_to_geometry
+from dolfinx.mesh import entities_to_geometry, locate_entities_boundary
 from mpi4py import MPI
 
 from fenics_hytf.domain.constraints import boundary_nodes, normal_axis
@@ -50,12 +50,13 @@ def side_column(domain: Domain, name: str) -> SideColumn:
         The column.
 
     Raises:
-        SceneError: On every rank: the side is not vertical, or its soils do not lie in level
-            layers.
+        SceneError: On every rank: the side is not vertical, only part of the mesh's side there, or
+            its soils do not lie in level layers.
     """
     up = domain.gdim - 1
     if normal_axis(domain, name) == up:
         raise SceneError([Fault(f"boundary.{name}", "a level boundary", "a vertical side")])
+    _require_whole_side(domain, name)
     cells, low, high = _facets(domain, name)
     levels, regions = _layers(domain, name, cells, low, high)
     width = float(np.diff(levels).max())
@@ -93,6 +94,30 @@ def distance_to_sides(domain: Domain, names: Sequence[str], x: RealArray) -> Rea
         plane = domain.comm.allreduce(float(places.min(initial=np.inf)), MPI.MIN)
         distance = np.minimum(distance, np.abs(x[:, axis] - plane))
     return distance
+
+
+def _require_whole_side(domain: Domain, name: str) -> None:
+    """Nothing of the mesh's side in the plane of a boundary has another name, or none."""
+    mesh, fdim = domain.mesh, domain.mesh.topology.dim - 1
+    axis = normal_axis(domain, name)
+    nodes = domain.V.tabulate_dof_coordinates()[boundary_nodes(domain, name), axis]
+    plane = domain.comm.allreduce(float(nodes.min(initial=np.inf)), MPI.MIN)
+    extent = domain.comm.allreduce(float(np.abs(mesh.geometry.x).max(initial=0.0)), MPI.MAX)
+    everything = locate_entities_boundary(
+        mesh, fdim, lambda x: np.abs(x[axis] - plane) <= 1e-9 * extent
+    )
+    others = np.setdiff1d(everything, domain.boundaries[name])
+    up = domain.gdim - 1
+    height = np.empty(0)
+    if len(others):
+        corners = entities_to_geometry(mesh, fdim, others)
+        height = mesh.geometry.x[corners, up].mean(axis=1)
+    heights = np.concatenate(domain.comm.allgather(height))
+    if len(heights):
+        reach = f"height {heights.min():g} to {heights.max():g} m"
+        found = f"only a part of the mesh's side at {'xyz'[axis]} = {plane:g} m, not round {reach}"
+        expected = "the whole side, from the base to the surface, under one name"
+        raise SceneError([Fault(f"boundary.{name}", found, expected)])
 
 
 def _facets(domain: Domain, name: str) -> tuple[npt.NDArray[np.int32], RealArray, RealArray]:

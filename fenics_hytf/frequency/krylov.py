@@ -99,7 +99,7 @@ def taylor(function: ScalarFunction, s: complex, order: int, radius: float) -> C
 def krylov_block(
     products: TermProducts,
     solve: Callable[[ComplexArray], ComplexArray],
-    b: ComplexArray,
+    first: ComplexArray,
     s: complex,
     size: int,
     order: int = 2,
@@ -109,7 +109,7 @@ def krylov_block(
     Args:
         products: The system's matrices.
         solve: Solves A(s) x = b with the factorisation at ``s``.
-        b: This rank's part of the right-hand side, shape ``(num_local,)``.
+        first: This rank's part of the solution at ``s``, shape ``(num_local,)``.
         s: Expansion point [rad/s]; on the real axis, where a hysteretic law is not regular, the
             block is the solution alone.
         size: Directions wanted.
@@ -122,9 +122,8 @@ def krylov_block(
     steps = size if radius > 0 else 1
     coefficients = [taylor(f, s, order, radius) for f in products.functions] if radius else []
     comm = products.comm
-    first = solve(b)
     length = _norm(comm, first)
-    Q = np.empty((len(b), steps), np.complex128, order="F")
+    Q = np.empty((len(first), steps), np.complex128, order="F")
     if length == 0.0:
         return Q[:, :0]
     Q[:, 0] = first / length
@@ -132,7 +131,7 @@ def krylov_block(
     states = np.zeros((steps, order, steps), np.complex128)
     states[0, 0, 0] = 1.0
     for k in range(1, steps):
-        pull = np.zeros(len(b), np.complex128)
+        pull = np.zeros(len(first), np.complex128)
         for back in range(order):
             x = Q[:, :k] @ states[k - 1, back, :k]
             factors = np.array([c[back + 1] for c in coefficients])

@@ -13,19 +13,23 @@ ComplexArray = npt.NDArray[np.complex128]
 
 
 class Sweep(Protocol):
-    """A solved sweep over frequencies.
+    """A solved sweep over frequencies."""
 
-    Attributes:
-        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
-        residuals: True relative residuals [-], shape ``(num_lines, num_sides)``.
-        factorisations: Matrices factorised.
-        solves: Solves with them.
-    """
+    @property
+    def s(self) -> ComplexArray:
+        """Complex frequencies [rad/s], shape ``(num_lines,)``."""
 
-    s: ComplexArray
-    residuals: npt.NDArray[np.float64]
-    factorisations: int
-    solves: int
+    @property
+    def residuals(self) -> npt.NDArray[np.float64]:
+        """Relative residuals [-], shape ``(num_lines, num_sides)``."""
+
+    @property
+    def factorisations(self) -> int:
+        """Matrices factorised."""
+
+    @property
+    def solves(self) -> int:
+        """Solves with them."""
 
     def solution(self, k: int) -> ComplexArray:
         """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""

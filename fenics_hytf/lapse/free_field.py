@@ -57,6 +57,7 @@ class FreeField:
     """
 
     def __init__(self, scene: Scene, domain: Domain, name: str, assemblies: Counter[str]) -> None:
+        self.name = name
         self._section = domain
         self._side = side_column(domain, name)
         column = self._side.domain

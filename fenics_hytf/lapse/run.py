@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.frequency import Sweep, direct_sweep
+from fenics_hytf.frequency import Sweep, direct_sweep, reduced_sweep
 from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.equivalent_linear import iterate
 from fenics_hytf.lapse.ground import ElasticConstants, Ground, Moduli, complex_constants
@@ -20,6 +20,9 @@ from fenics_hytf.motion import excited_lines, to_frequency
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
+
+_LOOSEST = 1e-2  # residual of a sweep that only tells the loop where to go
+_SHARE = 1e-2  # of the last change of the moduli, as a residual
 
 
 @dataclass
@@ -116,44 +119,92 @@ def solve(
         SweepError: A line cannot be solved.
         EquivalentLinearError: The loop reaches its limit.
     """
-    solver = scene.solver
-    tally = Tally()
-    last: list[tuple[Sweep, ElasticConstants]] = []
-
-    def sweep_with(moduli: Moduli, iteration: int) -> Sweep:
-        with observer.phase("assembly"):
-            parts = complex_constants(ground, moduli, solver.complex_modulus, solver.keep)
-            lapse = equations.assemble(ground, *parts)
-        with observer.phase("sweep"):
-            sweep = direct_sweep(
-                lapse.system,
-                lapse.loads,
-                excitation.s,
-                solver.tolerance,
-                lambda done, total: observer.sweeping(iteration, done, total),
-            )
-        tally.factorisations += sweep.factorisations
-        tally.solves += sweep.solves
-        last[:] = [(sweep, parts[0])]
-        return sweep
+    sweeps = _Sweeps(scene, equations, ground, excitation, observer)
 
     def peak_strain(moduli: Moduli, iteration: int) -> RealArray:
-        sweep = sweep_with(moduli, iteration)
+        sweep = sweeps.solve(moduli, iteration, sweeps.tolerance_so_far)
         with observer.phase("response"):
             return probe.peak_strain(sweep, excitation)
 
     effective, loop = None, LoopHistory()
     if scene.effects.equivalent_linear is None:
         moduli = ground.secant(start)
-        sweep_with(moduli, 0)
+        sweeps.solve(moduli, 0)
     else:
         moduli, effective, loop = iterate(
             ground,
             scene.effects.equivalent_linear,
             start,
             peak_strain,
-            observer.iterated,
+            sweeps.iterated,
             strain_from,
         )
-    ((sweep, constants),) = last
-    return Solved(excitation, sweep, moduli, constants, effective, loop, tally)
+        if sweeps.tolerance > scene.solver.tolerance:
+            sweeps.solve(moduli, len(loop.change))
+    assert sweeps.last is not None
+    constants, sweep = sweeps.constants, sweeps.last
+    return Solved(excitation, sweep, moduli, constants, effective, loop, sweeps.tally)
+
+
+class _Sweeps:
+    """The sweeps of a lapse, each with other moduli; one that is reduced learns from the last."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        equations: Equations,
+        ground: Ground,
+        excitation: Excitation,
+        observer: Observer,
+    ) -> None:
+        self._solver, self._equations, self._ground = scene.solver, equations, ground
+        self._excitation, self._observer = excitation, observer
+        self._change = 1.0
+        self._expansions: tuple[int, ...] = ()
+        self.tally = Tally()
+        self.tolerance = self._solver.tolerance
+        self.last: Sweep | None = None
+
+    def iterated(self, iteration: int, change: float) -> None:
+        """Take note of the change of an iteration, and pass it on."""
+        self._change = change
+        self._observer.iterated(iteration, change)
+
+    @property
+    def tolerance_so_far(self) -> float:
+        """What an iteration needs: a hundredth of what the moduli still change by."""
+        return max(self._solver.tolerance, min(_LOOSEST, _SHARE * self._change))
+
+    def solve(self, moduli: Moduli, iteration: int, tolerance: float | None = None) -> Sweep:
+        """Sweep with some moduli.
+
+        Args:
+            moduli: The moduli.
+            iteration: Number of the iteration.
+            tolerance: Relative residual of every line [-]; the scene's if ``None``. A direct sweep
+                is as good as it is.
+
+        Returns:
+            The sweep.
+        """
+        solver, excitation = self._solver, self._excitation
+        with self._observer.phase("assembly"):
+            parts = complex_constants(self._ground, moduli, solver.complex_modulus, solver.keep)
+            lapse = self._equations.assemble(self._ground, *parts)
+        with self._observer.phase("sweep"):
+            arguments = lapse.system, lapse.loads, excitation.s
+
+            def report(done: int, total: int) -> None:
+                self._observer.sweeping(iteration, done, total)
+
+            sweep: Sweep
+            if solver.sweep == "direct":
+                sweep = direct_sweep(*arguments, solver.tolerance, report)
+            else:
+                self.tolerance = solver.tolerance if tolerance is None else tolerance
+                reduced = reduced_sweep(*arguments, self.tolerance, report, self._expansions)
+                self._expansions, sweep = reduced.expansions, reduced
+        self.last, self.constants = sweep, parts[0]
+        self.tally.factorisations += sweep.factorisations
+        self.tally.solves += sweep.solves
+        return sweep

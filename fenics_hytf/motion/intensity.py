@@ -5,13 +5,15 @@
 - Cumulative absolute velocity CAV = ∫|a| dt (EPRI 1988).
 - Significant duration D5-95: the time in which I_a grows from 5 to 95 % (Trifunac and Brady 1975).
 - Velocity and displacement are integrals of the motion as the periodic one it is: â/(iω) and
-  -â/ω², without a line at zero frequency. Both have zero mean; nothing drifts.
+  -â/ω², without a line at zero frequency. Both have zero mean; nothing drifts. A motion that is
+  periodic in parts is integrated part by part: from one to the next it may jump.
 
 Integrals over time use the trapezoidal rule between samples.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,21 +50,25 @@ class Intensity:
     significant_duration: float
 
 
-def intensity_measures(acceleration: npt.ArrayLike, dt: float) -> Intensity:
+def intensity_measures(
+    acceleration: npt.ArrayLike, dt: float, starts: Sequence[int] = (0,)
+) -> Intensity:
     """All measures of a motion.
 
     Args:
         acceleration: [m/s^2], shape ``(num_samples,)``; its measures are NaN where a sample is.
         dt: Time step [s].
+        starts: First samples of the parts that are periodic each.
 
     Returns:
         The measures.
     """
     samples = np.asarray(acceleration, dtype=np.float64)
+    parts = np.split(samples, list(starts)[1:])
     return Intensity(
         pga=_peak(samples),
-        pgv=_peak(integrated(samples, dt)),
-        pgd=_peak(integrated(samples, dt, times=2)),
+        pgv=max(_peak(integrated(part, dt)) for part in parts),
+        pgd=max(_peak(integrated(part, dt, times=2)) for part in parts),
         arias=float(arias_intensity(samples, dt)),
         cav=float(cumulative_absolute_velocity(samples, dt)),
         significant_duration=significant_duration(samples, dt),

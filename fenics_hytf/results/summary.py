@@ -213,7 +213,7 @@ def _base(result: Result) -> dict[str, dict[str, Any]]:
     """Peak and intensity of the base's motions, by direction; the outcrop's where it is known."""
     base: dict[str, dict[str, Any]] = {}
     for kind, direction, motion in base_motions(result):
-        measures = intensity_measures(motion, result.dt)
+        measures = intensity_measures(motion, result.dt, _seams(result))
         told = base.setdefault(direction, {"outcrop_pga_g": None, "outcrop_intensity": None})
         told[f"{kind}_pga_g"] = measures.pga / GRAVITY
         told[f"{kind}_intensity"] = _with_units(measures)
@@ -222,14 +222,19 @@ def _base(result: Result) -> dict[str, dict[str, Any]]:
 
 def _intensity(result: Result) -> dict[str, dict[str, dict[str, float]]]:
     """Intensity measures of the total motion by receiver and component."""
-    history = result.history("total_acceleration")
+    history, seams = result.history("total_acceleration"), _seams(result)
     return {
         receiver: {
-            component: _with_units(intensity_measures(history[r, c], result.dt))
+            component: _with_units(intensity_measures(history[r, c], result.dt, seams))
             for c, component in enumerate(result.components)
         }
         for r, receiver in enumerate(result.receivers)
     }
+
+
+def _seams(result: Result) -> list[int]:
+    """First sample of each lapse, which is a periodic state of its own."""
+    return [round(lapse.start_time / result.dt) for lapse in result.lapses]
 
 
 def _with_units(measures: Intensity) -> dict[str, float]:

@@ -18,6 +18,7 @@ from fenics_hytf.scene.quadrature import (
 from fenics_hytf.scene.regions import Region
 from fenics_hytf.scene.scene import Scene, examine
 from fenics_hytf.scene.settings import (
+    Calm,
     Effects,
     EquivalentLinear,
     Lapses,
@@ -32,6 +33,7 @@ from fenics_hytf.scene.soil import Soil
 __all__ = [
     "Boundary",
     "Box",
+    "Calm",
     "Column",
     "Effects",
     "EquivalentLinear",

@@ -145,6 +145,26 @@ def _base_faults(
         yield Fault(key, text, expected)
 
 
+def outcrop_rules(
+    boundary: Boundary, directions: Collection[str], key: str = "boundary"
+) -> Iterator[Fault]:
+    """Nothing but the rock holds ground on a compliant base under outcrop motions.
+
+    Args:
+        boundary: The boundaries.
+        directions: Directions of the motions.
+        key: Where they stand.
+
+    Yields:
+        The faults: what is held would move as the bare rock does, which nothing at hand does.
+    """
+    for name, kind in boundary.kinds.items():
+        across = kind == "roller" and NORMALS.get(name) in directions
+        if kind in ("rigid", "fixed") or across:
+            expected = "tied, free_field, dashpot or free under an outcrop motion"
+            yield Fault(join_key(key, name_key(name)), f'"{kind}"', expected)
+
+
 def _read_rock(name: str, raw: object, key: str) -> tuple[Rock | None, list[Fault]]:
     """The rock below a compliant base."""
     if name != "base":

@@ -15,7 +15,13 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.motion import split
-from fenics_hytf.scene.boundary import BOUNDARY_KINDS, Boundary, default_kind, read_boundary
+from fenics_hytf.scene.boundary import (
+    BOUNDARY_KINDS,
+    Boundary,
+    default_kind,
+    outcrop_rules,
+    read_boundary,
+)
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
 from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
 from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
@@ -42,6 +48,9 @@ SECTIONS = (
     "solver",
     "output",
 )
+
+# G* of Dormieux is G(√(1 − 4D²) + 2iD), that of SHAKE91 G(1 − 2D² + ...).
+_MOST_DAMPING = {"dormieux": 0.5, "shake91": 0.5**0.5}
 
 
 @dataclass
@@ -179,6 +188,9 @@ def _base_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     base = boundary.get("base", default_kind("base")) if isinstance(boundary, dict) else None
     if isinstance(base, dict) and "compliant" in base:
         yield from input_rules(sections.motion, "compliant")
+        motions = [m for m in sections.motion if m is not None and m.input == "outcrop"]
+        if sections.boundary is not None and motions:
+            yield from outcrop_rules(sections.boundary, [m.direction for m in motions])
     elif isinstance(base, str) and base in set(BOUNDARY_KINDS) - {"dashpot", "free_field"}:
         yield from input_rules(sections.motion, base)
 
@@ -192,6 +204,7 @@ def _calm_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     names = drawn.boundaries if drawn is not None else None
     for i, side in enumerate(calm.sides):
         where = join_key("effects.calm.sides", i)
+        # Of a mesh file the names are known later.
         if side in ("base", "top") or (names is not None and side not in names):
             sides = [name for name in names or () if name not in ("base", "top")]
             yield Fault(where, toml_text(side), ", ".join(sides) or "a side")
@@ -236,17 +249,19 @@ def _lapse_rules(lapses: Lapses, num_samples: int, dt: float) -> Iterator[Fault]
 
 
 def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
-    """Damping below 0.5 with Dormieux's modulus; curves for the equivalent-linear loop."""
+    """Damping that leaves stiffness; curves for the equivalent-linear loop."""
     soils = raw.get("soil")
     if not isinstance(soils, dict):
         return
     solver, effects = raw.get("solver"), raw.get("effects")
-    if isinstance(solver, dict) and solver.get("complex_modulus") == "dormieux":
+    law = solver.get("complex_modulus") if isinstance(solver, dict) else None
+    if law in _MOST_DAMPING:
         for name, soil in soils.items():
-            yield from _dormieux(soil, join_key("soil", name_key(name)), sections.folder)
+            yield from _damping_limit(law, soil, join_key("soil", name_key(name)), sections.folder)
         base = raw["boundary"].get("base") if isinstance(raw.get("boundary"), dict) else None
         if isinstance(base, dict):
-            yield from _dormieux(base.get("compliant"), "boundary.base.compliant", sections.folder)
+            rock = base.get("compliant")
+            yield from _damping_limit(law, rock, "boundary.base.compliant", sections.folder)
     loop = effects.get("equivalent_linear", False) if isinstance(effects, dict) else False
     if loop is False or loop is None:
         return
@@ -259,16 +274,17 @@ def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
         yield Fault("effects.equivalent_linear", "no soil with curves", expected)
 
 
-def _dormieux(raw: object, key: str, folder: Path) -> Iterator[Fault]:
-    """G(sqrt(1 - 4 D^2) + 2 i D) needs D below one half, of the curve at every strain."""
+def _damping_limit(law: str, raw: object, key: str, folder: Path) -> Iterator[Fault]:
+    """Damping ratios at which the real part of G* is still positive, of the curve everywhere."""
     if not isinstance(raw, dict):
         return
-    expected = 'below 0.5 with complex_modulus = "dormieux"'
+    limit = _MOST_DAMPING[law]
+    expected = f'below {limit:.4g} with complex_modulus = "{law}"'
     damping = number(raw, "damping")
-    if damping is not None and 0.5 <= damping < 1:
+    if damping is not None and limit <= damping < 1:
         yield Fault(join_key(key, "damping"), toml_text(damping), f"a damping ratio {expected}")
     curves = raw.get("curves")
     curve = read_curves(curves, "curves", folder)[0] if isinstance(curves, dict) else None
-    if curve is not None and float(curve.damping.max()) >= 0.5:
+    if curve is not None and float(curve.damping.max()) >= limit:
         found = f"damping up to {float(curve.damping.max()):g}"
         yield Fault(join_key(key, "curves"), found, f"damping ratios {expected}")

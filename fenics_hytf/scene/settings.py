@@ -192,7 +192,7 @@ class Solver(Table):
     """How the lines are solved.
 
     Attributes:
-        sweep: ``direct``: one factorisation a line.
+        sweep: ``direct``: one factorisation a line; ``reduced``: projected on a few directions.
         complex_modulus: Convention of the complex modulus.
         keep: ``poisson``: the whole elasticity tensor is complex; ``bulk``: its deviator only.
         tolerance: Relative residual on every excited line [-].
@@ -200,7 +200,7 @@ class Solver(Table):
         excited: A line is excited above this fraction of the spectral peak [-].
     """
 
-    sweep: Literal["direct"] = Field("direct", description='"direct"')
+    sweep: Literal["direct", "reduced"] = Field("direct", description='"direct" or "reduced"')
     complex_modulus: Literal["hysteretic", "kramer", "shake91", "dormieux"] = Field(
         "hysteretic", description='"hysteretic", "kramer", "shake91" or "dormieux"'
     )
@@ -217,7 +217,6 @@ class Solver(Table):
         "reference_frequency": 'it belongs to complex_modulus = "maxwell"'
     }
     later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "sweep": {"reduced": '"direct" is'},
         "complex_modulus": {"maxwell": "hysteretic, kramer, shake91 and dormieux are"},
     }
 
@@ -281,6 +280,9 @@ def read_output(
         table = {}
     for name, place in table.items():
         where = join_key(key, "receivers", name_key(name))
+        if name in ("within", "outcrop"):
+            expected = "another name: so the motions of the base are called in exports"
+            faults.append(Fault(where, toml_text(name), expected))
         if not _RECEIVER_NAME.fullmatch(str(name)):
             faults.append(Fault(where, toml_text(name), "a name of letters, digits, _ and - only"))
         receiver, found = _read_receiver(place, where)

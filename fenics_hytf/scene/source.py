@@ -105,10 +105,12 @@ def _key_path(text: str) -> list[str] | None:
 
 
 def _replace_motion(data: dict[str, Any], path: Path) -> None:
-    """Put a file in the place of the first motion's source."""
+    """Put a file in the place of the first motion's source; CSV files stay in their units."""
     motions = data.setdefault("motion", [{}])
     if isinstance(motions, list) and motions and isinstance(motions[0], dict):
         kept = {k: v for k, v in motions[0].items() if k not in _SOURCES}
+        if "units" in motions[0] and path.suffix.lower() != ".at2":
+            kept["units"] = motions[0]["units"]
         motions[0] = {**kept, "file": str(path)}
 
 

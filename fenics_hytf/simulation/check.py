@@ -8,9 +8,15 @@ from functools import partial
 
 from mpi4py import MPI
 
-from fenics_hytf.domain import Domain, constraint_matrix, examine, normal_axis, side_column
+from fenics_hytf.domain import (
+    Domain,
+    constraint_matrix,
+    distance_to_sides,
+    examine,
+    side_column,
+)
 from fenics_hytf.lapse import column_supports
-from fenics_hytf.scene import Fault, Scene, SceneError, Sections
+from fenics_hytf.scene import Calm, Fault, Scene, SceneError, Sections, default_kind
 from fenics_hytf.simulation.receivers import receiver_faults
 
 
@@ -76,7 +82,7 @@ def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
     attempts: list[Callable[[], object]] = [
         lambda: constraint_matrix(domain, supports, axes).destroy(),
         *(partial(_try_column, domain, name, supports, axes) for name in supports),
-        *(partial(normal_axis, domain, name) for name in (calm.sides if calm else ())),
+        *([partial(_try_layer, domain, calm, supports)] if calm else []),
     ]
     faults: list[Fault] = []
     for attempt in attempts:
@@ -92,3 +98,24 @@ def _try_column(domain: Domain, name: str, supports: dict[str, str], axes: list[
     if supports[name] == "free_field":
         column = side_column(domain, name).domain
         constraint_matrix(column, column_supports(supports, column.gdim), axes).destroy()
+
+
+def _try_layer(domain: Domain, calm: Calm, supports: dict[str, str]) -> None:
+    """Lay an absorbing layer along plane sides that let it, and leave something of the section."""
+    for number, side in enumerate(calm.sides):
+        key = f"effects.calm.sides[{number}]"
+        if side not in domain.boundaries:
+            names = ", ".join(domain.boundaries)
+            raise SceneError([Fault(key, f"no boundary '{side}' in the mesh", f"one of {names}")])
+        kind = supports.get(side, default_kind(side))
+        if kind in ("tied", "free_field"):
+            expected = (
+                "a side that is free, dashpot or fixed: the layer would damp the level ground "
+                "that such a side goes on as"
+            )
+            raise SceneError([Fault(key, f"'{side}', which is {kind}", expected)])
+    distance = distance_to_sides(domain, calm.sides, domain.centroids())
+    if distance.max() < calm.thickness:
+        found = f"{calm.thickness:g}, a layer that holds every cell"
+        expected = f"a thickness below {distance.max():.4g} m"
+        raise SceneError([Fault("effects.calm.thickness", found, expected)])

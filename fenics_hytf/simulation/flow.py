@@ -172,7 +172,7 @@ class _Run:
         excitation = excite(self.scene, acceleration, self.equations.axes)
         observer = self._observer(index)
         for column in self.free_fields:
-            self._count(column.solve(excitation, observer))
+            self._count(column.solve(excitation, self._observer(index, column.name)))
         start = self._effective_strain  # of the lapse before
         solved = solve(
             self.scene,
@@ -302,18 +302,18 @@ class _Run:
                 )
             )
 
-    def _observer(self, index: int) -> Observer:
+    def _observer(self, index: int, side: str = "") -> Observer:
         return Observer(
             lambda iteration, done, total: self._report(
-                index, "sweep", iteration=iteration, done=done, total=total
+                index, "sweep", iteration=iteration, done=done, total=total, side=side
             ),
             lambda iteration, change: self._report(
-                index, "iteration", iteration=iteration, change=change
+                index, "iteration", iteration=iteration, change=change, side=side
             ),
             self.clock.phase,
         )
 
-    def _report(self, index: int, phase: str, **values: float) -> None:
+    def _report(self, index: int, phase: str, **values: float | str) -> None:
         if self._progress is None:
             return
         report = Progress(index, len(self.scene.segments), phase, **values)  # type: ignore[arg-type]

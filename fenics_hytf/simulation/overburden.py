@@ -2,7 +2,8 @@
 """Vertical stress of level ground: the weight of what lies above, less the water's uplift.
 
 σ_v(y) = ∫ ρ(y') g dy' from y to the surface, with g = 9.80665 m/s². Below a water table at y_w
-the pore pressure γ_w (y_w - y), γ_w = 9810 N/m³, is taken off: Terzaghi's (1925) effective stress.
+the pore pressure γ_w (y_w - y), γ_w = 1000 kg/m³ · g, is taken off: effective stress (Terzaghi
+1925).
 Densities are total ones, of saturated soil below the table. Water above the surface weighs as much
 on the total stress as on the pore pressure, so it cancels. Soil spreads no load sideways: of a box
 with regions side by side each place carries what is straight above it.
@@ -19,7 +20,7 @@ from fenics_hytf.scene.mesh import Column, Mesh
 
 RealArray = npt.NDArray[np.float64]
 
-WATER_WEIGHT = 9810.0
+WATER_WEIGHT = 1000.0 * GRAVITY
 """Unit weight of water γ_w [N/m^3]."""
 
 

@@ -78,6 +78,7 @@ class Progress:
         total: Lines of the running sweep.
         change: Last change of the equivalent-linear loop [-], or NaN.
         residual: Worst residual so far [-], or NaN.
+        side: The side whose free field is being solved, or nothing.
     """
 
     lapse: int
@@ -88,6 +89,7 @@ class Progress:
     total: int = 0
     change: float = float("nan")
     residual: float = float("nan")
+    side: str = ""
 
 
 ProgressCallback = Callable[[Progress], None]

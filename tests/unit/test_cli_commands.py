@@ -115,7 +115,7 @@ def test_every_fault_is_told_at_once_and_nothing_written(here, hytf):
         (("s.toml", "--set", "nonsense"), "nonsense"),
         (("s.toml", "--resume"), "--resume: not in this version"),
         (("s.toml", "--group-size", "2"), "--group-size: not in this version"),
-        (("s.toml", "--set", 'solver.sweep="reduced"'), "not in this version"),
+        (("s.toml", "--set", 'lapses.continuity="transient"'), "not in this version"),
         (("s.toml", "--bogus"), "bogus"),
         ((), "SCENE"),
     ],

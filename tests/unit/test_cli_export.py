@@ -121,13 +121,6 @@ def test_relative_accelerations_as_at2(here, hytf):
     np.testing.assert_allclose(back, result.history("acceleration")[0, 0], rtol=5.01e-8)
 
 
-def test_a_receiver_called_as_a_motion_of_the_base(here, hytf):
-    store(output={"receivers": {"within": [0.5, 20.0]}})
-    assert hytf("r")[0] == 0
-    assert files("r-motions") == ["within_x.at2"]
-    assert "within at (0.5, 20) m" in Path("r-motions/within_x.at2").read_text()
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -196,7 +196,7 @@ def test_a_block_spans_the_taylor_coefficients():
     for _ in range(5):
         pull = A1 @ x[-1] + (A2 @ x[-2] if len(x) > 1 else 0)
         x.append(-np.linalg.solve(A0, pull))
-    Q = krylov_block(TermProducts(system), lambda v: np.linalg.solve(A0, v), b, s, 6)
+    Q = krylov_block(TermProducts(system), lambda v: np.linalg.solve(A0, v), x[0], s, 6)
     np.testing.assert_allclose(Q.conj().T @ Q, np.eye(6), atol=1e-12)
     for k, wanted in enumerate(x):
         left = wanted - Q[:, : k + 1] @ (Q[:, : k + 1].conj().T @ wanted)

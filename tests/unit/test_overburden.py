@@ -9,7 +9,7 @@ import pytest
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation.overburden import vertical_stress
 
-G0, WATER = 9.80665, 9810.0
+G0, WATER = 9.80665, 9806.65
 SAND, CLAY, FILL = 1900.0, 1700.0, 1600.0
 
 

@@ -149,10 +149,11 @@ def test_intensity_of_every_receiver(tmp_path):
     result = make_result(directions=("x", "z"), gdim=3, kind="box", lapses=3)
     summary = write(tmp_path / "r", result)
     history = result.history("total_acceleration")
+    seams = np.cumsum([0, *(lapse.num_samples for lapse in result.lapses[:-1])])
     for r, name in enumerate(result.receivers):
         for c, component in enumerate(result.components):
             told = summary["intensity"][name][component]
-            expected = intensity_measures(history[r, c], result.dt)
+            expected = intensity_measures(history[r, c], result.dt, seams)
             assert told["pga_m_s2"] == expected.pga and told["pgv_m_s"] == expected.pgv
             assert told["pgd_m"] == expected.pgd and told["cav_m_s"] == expected.cav
             assert told["arias_m_s"] == expected.arias
@@ -241,7 +242,7 @@ def test_below_a_water_table_the_stress_ratio_is_larger(tmp_path):
     write(tmp_path / "dry", result)
     write(tmp_path / "wet", make_result(output=output))
     dry, wet = (read_table(tmp_path / name / "cells.csv") for name in ("dry", "wet"))
-    uplift = 9810.0 * np.maximum(20.0 - dry["y"], 0.0)
+    uplift = 9806.65 * np.maximum(20.0 - dry["y"], 0.0)
     # differences of numbers up to 4e5
     np.testing.assert_allclose(dry["vertical_stress"] - wet["vertical_stress"], uplift, atol=1e-9)
     ratio = wet["peak_stress"] / wet["vertical_stress"]

@@ -4,7 +4,7 @@
 import copy
 
 import pytest
-from support.meshes import gmsh_section
+from support.meshes import gmsh_model, gmsh_section
 
 from fenics_hytf.cli import main
 from fenics_hytf.scene import Scene, SceneError, check
@@ -144,6 +144,41 @@ def test_points_do_not_move_across_a_section(effect):
 
 
 @pytest.mark.parametrize(
+    ("kind", "direction", "bad"),
+    [
+        ("rigid", "x", True),
+        ("fixed", "y", True),
+        ("roller", "x", True),
+        ("roller", "y", False),
+        ("dashpot", "x", False),
+    ],
+)
+def test_what_is_held_beside_a_compliant_base(kind, direction, bad):
+    boundary = {"base": {"compliant": ROCK}, "left": kind, "right": "free"}
+    found = faults(
+        changed(boundary=boundary, motion=[GOOD["motion"][0] | {"direction": direction}])
+    )
+    assert list(found) == (["boundary.left"] if bad else [])
+
+
+def test_an_absorbing_layer_along_level_ground():
+    boundary = {"base": {"compliant": ROCK}, "left": "tied", "right": "tied"}
+    calm = {"sides": ["left"], "thickness": 1.0}
+    found = faults(changed(boundary=boundary, effects={"calm": calm}))
+    assert list(found) == ["effects.calm.sides[0]"] and "tied" in found["effects.calm.sides[0]"]
+    found = faults(changed(effects={"calm": {"sides": ["left"], "thickness": 1.0}}))
+    assert list(found) == ["effects.calm.sides[0]"]  # free_field
+    found = faults(changed(effects={"calm": {"sides": ["right"], "thickness": 9.0}}))
+    assert list(found) == ["effects.calm.thickness"]
+
+
+def test_shake91_without_stiffness():
+    soil = {"clay": SOIL | {"damping": 0.8}, "sand": SOIL}
+    solver = {"complex_modulus": "shake91"}
+    assert list(faults(changed(soil=soil, solver=solver))) == ["soil.clay.damping"]
+
+
+@pytest.mark.parametrize(
     ("calm", "key"),
     [
         ({"sides": ["top"], "thickness": 1.0}, "effects.calm.sides[0]"),
@@ -177,6 +212,31 @@ def test_sides_of_a_mesh_file(tmp_path):
     assert faults(data) == {}
     data["boundary"] = {"base": {"compliant": ROCK}, "left": "free_field", "west": "dashpot"}
     assert list(faults(data)) == ["boundary.west"]
+    data["boundary"] = {"base": {"compliant": ROCK}}
+    data["effects"] = {"calm": {"sides": ["north"], "thickness": 0.1}}
+    assert list(faults(data)) == ["effects.calm.sides[0]"]
+
+
+def test_a_part_of_a_side_is_no_free_field(tmp_path):
+    """Its column would stand on the side's own foot, not on the base."""
+    file = tmp_path / "parts.msh"
+    with gmsh_model(file, MeshSizeMax=1.0) as gmsh:
+        geo = gmsh.model.geo
+        places = [(0, 0), (4, 0), (4, 2), (0, 2), (0, 1)]
+        p = [geo.addPoint(x, y, 0) for x, y in places]
+        lines = [geo.addLine(p[i], p[(i + 1) % 5]) for i in range(5)]
+        surface = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        geo.synchronize()
+        gmsh.model.addPhysicalGroup(2, [surface], name="clay")
+        for name, tag in (("base", 0), ("right", 1), ("up", 3), ("low", 4)):
+            gmsh.model.addPhysicalGroup(1, [lines[tag]], name=name)
+    data = changed(mesh={"file": str(file)}, output={"receivers": {}})
+    for name in ("up", "low"):
+        data["boundary"] = {"base": {"compliant": ROCK}, "right": "free_field", name: "free_field"}
+        found = faults(data)
+        assert list(found) == [f"boundary.{name}"]
+        assert "only a part" in found[f"boundary.{name}"]
+        assert "under one name" in found[f"boundary.{name}"]
 
 
 def test_bad_input_is_2_and_writes_nothing(tmp_path, capsys, monkeypatch):

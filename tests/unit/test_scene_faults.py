@@ -208,6 +208,12 @@ def test_one_fault_gives_one_message(values, key, found, expected, tmp_path):
     assert expected in got[0].expected
 
 
+@pytest.mark.parametrize("name", ["within", "outcrop"])
+def test_receivers_that_are_called_like_motions_of_the_base(name):
+    got = faults(changed(output__receivers={name: [0.5, 1.0]}))
+    assert [fault.key for fault in got] == [f"output.receivers.{name}"]
+
+
 @pytest.mark.parametrize("name", ["a.b", "a,b", 'a"b', "a/b", "a\nb", "", "a b", "..", "a\\b"])
 def test_receiver_names_that_are_no_column(name):
     got = faults(changed(output__receivers={name: [0.5, 1.0]}))
@@ -219,7 +225,6 @@ def test_receiver_names_that_are_no_column(name):
     [
         ({"mesh__empty": ["air"]}, "mesh.empty"),
         ({"lapses__continuity": "transient"}, "lapses.continuity"),
-        ({"solver__sweep": "reduced"}, "solver.sweep"),
         ({"solver__complex_modulus": "maxwell"}, "solver.complex_modulus"),
         ({"solver__reference_frequency": 2.0}, "solver.reference_frequency"),
         *(

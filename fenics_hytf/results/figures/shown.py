@@ -12,6 +12,8 @@ from fenics_hytf.results.figures.style import MAX_LINES, chosen
 from fenics_hytf.results.reader import StoredResult
 from fenics_hytf.results.summary import component_peaks
 
+_ROUNDING = 1e-6  # of the input: less is not a motion
+
 RealArray = npt.NDArray[np.floating[Any]]
 
 FEW_LINES = 5
@@ -53,12 +55,13 @@ def transfer_column(stored: StoredResult, name: str, component: str, direction: 
 
 
 def has_transfer(stored: StoredResult, component: str, direction: str) -> bool:
-    """Whether the input in a direction moves a component at all."""
-    return any(
-        np.any(stored.transfer[transfer_column(stored, n, component, direction) + f".{part}"])
-        for n in stored.summary["receivers"]
+    """Whether the input in a direction moves a component by more than rounding."""
+    columns = [
+        stored.transfer[transfer_column(stored, name, component, direction) + f".{part}"]
+        for name in stored.summary["receivers"]
         for part in ("re", "im")
-    )
+    ]
+    return any(np.nanmax(np.abs(column), initial=0.0) > _ROUNDING for column in columns)
 
 
 def solved_band(stored: StoredResult) -> tuple[float, float] | None:

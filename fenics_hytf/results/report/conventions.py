@@ -24,7 +24,10 @@ _KINDS = {
     "roller": "held to the input's motion across the boundary and free along it",
     "tied": "tied to the opposite side, so that both move alike, as in level ground without end",
     "free": "free of stress",
-    "dashpot": "lined with dashpots (ρVp across and ρVs along the boundary) that let waves out",
+    "dashpot": (
+        "lined with dashpots (ρVp across and ρVs along the boundary) on the velocity relative to "
+        "the input, which let waves out"
+    ),
     "free_field": (
         "joined by dashpots to level ground of the same soil, a column solved along with the rest"
     ),
