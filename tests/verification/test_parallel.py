@@ -264,7 +264,7 @@ def layered(cell, sides, directions, kinematics=None, **sections):
 def test_sections_on_rock(sides, cell, directions, kinematics, figure):
     effects = {"rayleigh": {"alpha": 0.05, "beta": 1e-3}}
     if sides == "free":
-        effects["calm"] = {"sides": ["left", "right"], "thickness": 2.0}
+        effects["calm"] = {"sides": ["left", "right"], "thickness": 1.0}
     case = layered(cell, sides, directions, kinematics, effects=effects)
     agree(case, figure, f"{cell} section on rock, sides {sides}, {directions}")
 
