@@ -23,7 +23,7 @@ _PREFIX = "hytf_direct_"
 
 # Inertia forces over the load: 1/2D at a damped resonance. A line within 1e-10 of an undamped one
 # is on it: of sixteen digits fewer than six would be left.
-_RESONANCE = 1e10
+RESONANCE = 1e10
 
 
 _FEW = 200  # unknowns; a cell has 81 at most
@@ -174,7 +174,7 @@ class SymmetricFactorisation:
         """|s² M x| against |b|: a small system has a small residual even where A is singular."""
         self._system.mass.mult(x, self._residual)
         amplification = abs(self._s) ** 2 * self._residual.norm() / load
-        if amplification > _RESONANCE:
+        if amplification > RESONANCE:
             raise ResonanceError(self._s, amplification)
 
     def backsolve(self, b: PETSc.Vec, x: PETSc.Vec) -> None:

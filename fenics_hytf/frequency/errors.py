@@ -70,6 +70,5 @@ class ReductionError(SweepError):
             complex(lines[0]),
             f"found {len(lines)} lines from {hertz.min():.6g} to {hertz.max():.6g} Hz with "
             f"relative residuals up to {residual:.3g}; expected at most {tolerance:.3g} within the "
-            "budget of factorisations: raise the budget, loosen the tolerance, or use the direct "
-            "sweep",
+            'budget of factorisations: loosen solver.tolerance, or use solver.sweep = "direct"',
         )

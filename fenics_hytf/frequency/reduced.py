@@ -20,8 +20,8 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.linalg.blas import zgemm
 
-from fenics_hytf.frequency.direct import SymmetricFactorisation
-from fenics_hytf.frequency.errors import ReductionError
+from fenics_hytf.frequency.direct import RESONANCE, SymmetricFactorisation
+from fenics_hytf.frequency.errors import ReductionError, ResonanceError
 from fenics_hytf.frequency.krylov import TermProducts, krylov_block
 from fenics_hytf.frequency.loads import LoadFactors, Loads, factor_loads
 from fenics_hytf.frequency.system import DynamicSystem
@@ -109,6 +109,8 @@ def reduced_sweep(
     Raises:
         ReductionError: Lines that did not reach the tolerance within the budget.
         FactorisationError: A(s) is singular at an expansion point.
+        ResidualError: A factorisation there is not good enough.
+        ResonanceError: A line lies on an undamped resonance.
     """
     lines = np.atleast_1d(np.asarray(s, np.complex128))
     allowed = len(lines) if budget is None else budget
@@ -146,6 +148,7 @@ class _Growth:
         self._comm = self._products.comm
         self._lines, self._tolerance = lines, tolerance
         self._vectors = system.mass.createVecs()
+        self._mass = next(i for i, (m, _) in enumerate(system.terms) if m is system.mass)
         self._loads = loads
         count, num_loads = loads.vectors.shape
         self._V: ComplexArray = np.empty((count, 0), np.complex128, order="F")
@@ -177,7 +180,7 @@ class _Growth:
         self._factorisation.factorise(s)
         self.expansions.append(line)
         loads = self._loads.at(line)
-        solved = np.stack([self._solve(b) for b in loads.T], axis=1)
+        solved = np.stack([self._solve(b, check=True) for b in loads.T], axis=1)
         for x in solved.T:
             self._take(x[:, None] / (self._length(x) or 1.0), _ROUND_OFF)
             self._take(krylov_block(self._products, self._solve, x, s, size))
@@ -187,10 +190,14 @@ class _Growth:
                 self._take(krylov_block(self._products, self._solve, x, s, size // 2))
         self._solved[line] = self._inner(self._V, solved)
 
-    def _solve(self, right: ComplexArray) -> ComplexArray:
+    def _solve(self, right: ComplexArray, check: bool = False) -> ComplexArray:
+        """Solve with the factorisation at hand; the solution of a line itself is checked."""
         x, b = self._vectors
         b.array[:] = right
-        self._factorisation.backsolve(b, x)
+        if check:
+            self._factorisation.solve(b, x, self._tolerance)
+        else:
+            self._factorisation.backsolve(b, x)
         self.solves += 1
         return x.array_r.copy()
 
@@ -246,6 +253,7 @@ class _Growth:
             self._judge(self._checked)  # with the whole basis
             self._judge_truly()
             self._sift(1.0)
+            self._require_no_resonance()
 
     def _sift(self, fraction: float = _MARGIN) -> None:
         above = self.residuals[self._checked].max(axis=1, initial=0.0) > fraction * self._tolerance
@@ -285,6 +293,19 @@ class _Growth:
                 left -= self._factors[term, line] * self._products(term, x)
             power = self._comm.allreduce(np.sum(np.abs(left) ** 2, axis=0))
             self.residuals[line] = np.sqrt(power) / self._loads.norms[line]
+
+    def _require_no_resonance(self) -> None:
+        """|s² VᴴMV y| against |b|, as the direct sweep looks at |s² M x|."""
+        mass = self._reduced[self._mass]
+        for start in range(0, len(self._lines), _LINES):
+            some = np.arange(start, min(start + _LINES, len(self._lines)))
+            inertia = np.linalg.norm(np.tensordot(mass, self._coordinates(some), axes=1), axis=0)
+            growth = np.abs(self._lines[some]) ** 2 * (inertia.T / self._loads.norms[some]).max(
+                axis=1
+            )
+            worst = int(np.argmax(growth))
+            if growth[worst] > RESONANCE:
+                raise ResonanceError(complex(self._lines[some[worst]]), float(growth[worst]))
 
     def next_expansion(self, block: int) -> tuple[list[int], int]:
         """Where to expand next, if anywhere, and in how many directions.

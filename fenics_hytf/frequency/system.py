@@ -15,8 +15,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-# Spring of a dashpot at rest over its impedance [rad/s]: as stiff as a hundred metres of rock of
-# 1000 m/s and more, so about as stiff as a cell and well conditioned.
+# Spring of a dashpot at rest over its impedance [rad/s]: as stiff as ten metres of rock of
+# 1000 m/s, so about as stiff as a cell and well conditioned.
 _AT_REST = 100.0
 
 ScalarFunction = Callable[[complex], complex]
@@ -43,7 +43,7 @@ def radiation(factor: complex) -> ScalarFunction:
         factor: M*/M, complex over real modulus, at positive frequencies [-].
 
     Returns:
-        The function; on the real axis, where the modulus is real, it is s.
+        The function; on the real axis, where the modulus is real, it is s, and at rest the spring.
     """
     root = complex(np.sqrt(complex(factor)))
 

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The motion of the base, as a within and as an outcrop motion.
 
-A *within* motion is the total motion of the base, an *outcrop* motion that of the bare rock. The
+A *within* motion is the total motion of the base, of a section its mean along the base; an
+*outcrop* motion is that of the bare rock. The
 dashpots of the rock tell one from the other, for they carry the traction of the base:
 
     τ = ρV* (v_outcrop − v_within)
@@ -20,7 +21,7 @@ from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.response import Excitation
 from fenics_hytf.operators import boundary_area, constrained_rows, mean_rows
 from fenics_hytf.scene import Scene
-from fenics_hytf.soil import complex_factor
+from fenics_hytf.soil import wave_factors
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -80,8 +81,9 @@ def outcrop_motion(
 ) -> RealArray | None:
     """Acceleration of bare rock in the direction of each motion.
 
-    From a within motion it follows for a column, whose base is under one traction throughout: the
-    force that its base takes is that of its inertia, τA = rᵀM(r a_b + s²u).
+    From a within motion it follows for a column between level ground, whose base is under one
+    traction throughout. The force that its base takes is that of its inertia,
+    τA = rᵀM(r a_b + s²u).
 
     Args:
         scene: The scene.
@@ -94,12 +96,12 @@ def outcrop_motion(
         On the solved lines [m/s^2], shape ``(num_motions, num_samples)``; ``None`` where the
         scene does not tell the rock, or the traction.
     """
-    rock, rayleigh = scene.boundary.rock, scene.effects.rayleigh
+    rock = scene.boundary.rock
     if rock is None:
         return None
     if not equations.base_is_held:
         return excitation.to_time(excitation.weights)
-    if scene.mesh.column is None or (rayleigh is not None and rayleigh.alpha > 0):
+    if not _traction_is_known(scene):
         return None
     force = _base_force(domain, equations, sweep, excitation)
     vertical = domain.components.index("y") if "y" in domain.components else None
@@ -107,10 +109,24 @@ def outcrop_motion(
         rock.p_wave_velocity if axis == vertical else rock.shear_wave_velocity
         for axis in excitation.axes
     ]
-    root = np.sqrt(complex(complex_factor(rock.damping, scene.solver.complex_modulus)))
-    impedance = rock.density * np.array(velocity) * root * boundary_area(domain, "base")
+    solver = scene.solver
+    factors = wave_factors(rock.damping, rock.poisson, solver.complex_modulus, solver.keep)
+    roots = np.sqrt([factors[0 if axis == vertical else 1] for axis in excitation.axes])
+    impedance = rock.density * np.array(velocity) * roots * boundary_area(domain, "base")
     # v_outcrop − v_within = τ/ρV*; at rest they are the same
     return excitation.to_time(excitation.weights + excitation.s * force / impedance[:, None])
+
+
+def _traction_is_known(scene: Scene) -> bool:
+    """A column between sides of level ground, and nothing that pulls at it from outside."""
+    kinds, rayleigh = scene.boundary.kinds, scene.effects.rayleigh
+    level = all(kinds.get(side) in ("tied", "free_field") for side in ("left", "right"))
+    return (
+        scene.mesh.column is not None
+        and level
+        and kinds.get("top", "free") == "free"
+        and (rayleigh is None or rayleigh.alpha == 0)
+    )
 
 
 def _base_force(

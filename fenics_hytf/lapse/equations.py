@@ -5,7 +5,8 @@ u is relative to the motion that is given: that of a rigid base, or the outcrop 
 below a compliant one. Seen from there the rock brings no force but that of its dashpots ρV* at the
 base, and the right-hand side is the same in both cases: with u_o = r a_o/s² subtracted from the
 total motion, s C r u_o of the incoming wave leaves with s C u of the dashpots (Lysmer and
-Kuhlemeyer 1969; Joyner and Chen 1975), and K r = 0.
+Kuhlemeyer 1969; Joyner and Chen 1975), and K r = 0. Dashpots of sides and the mass term of Rayleigh
+damping act on u, the motion relative to the input, as well.
 
 Matrices and forms are made once a run and refilled; what the scene does not call for is not made.
 """
@@ -41,7 +42,7 @@ from fenics_hytf.operators import (
 )
 from fenics_hytf.particles import Points, particle_mass_matrix, transfer_matrix
 from fenics_hytf.scene import Scene
-from fenics_hytf.soil import complex_factor
+from fenics_hytf.soil import wave_factors
 
 RealArray = npt.NDArray[np.float64]
 
@@ -62,7 +63,7 @@ class LapseEquations:
 
     Attributes:
         system: A(s) of the lapse.
-        loads: −TᵀM r of each motion [kg], with what comes from beyond the sides.
+        loads: −TᵀM r of each motion [kg, in 2D kg/m], with what comes from beyond the sides.
     """
 
     system: DynamicSystem
@@ -101,6 +102,7 @@ class Equations:
         self._K = self._elastic.create_matrix()
         # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
+        self._radiating: list[tuple[PETSc.Mat, ScalarFunction]] = []
         # Of each motion: M r at the nodes, −TᵀM r, and that with the forces of a line.
         self._influence: list[PETSc.Vec] = []
         self._inertia: list[PETSc.Vec] = []
@@ -153,15 +155,23 @@ class Equations:
             self._stand_on_rock(cells)
 
     def _stand_on_rock(self, cells: int) -> None:
-        rock = self._scene.boundary.rock
+        """Dashpots ρV of the rock, those of P and of S waves apart where they damp otherwise."""
+        rock, solver = self._scene.boundary.rock, self._scene.solver
         assert rock is not None
-        impedance = [
-            np.full(cells, rock.density * velocity)
-            for velocity in (rock.p_wave_velocity, rock.shear_wave_velocity)
-        ]
-        DashpotForm(self._domain, ["base"]).assemble(self._K, *impedance)
-        self._assemblies["dashpot"] += 1
-        self._constrain("base", self._K)
+        across = np.full(cells, rock.density * rock.p_wave_velocity)
+        along = np.full(cells, rock.density * rock.shear_wave_velocity)
+        pressure, shear = wave_factors(
+            rock.damping, rock.poisson, solver.complex_modulus, solver.keep
+        )
+        parts = [(across, along, shear)]
+        if pressure != shear:
+            parts = [(across, 0 * along, pressure), (0 * across, along, shear)]
+        form = DashpotForm(self._domain, ["base"])
+        for number, (normal, tangential, factor) in enumerate(parts):
+            form.assemble(self._K, normal, tangential)
+            self._assemblies["dashpot"] += 1
+            matrix = self._constrain(f"base {number}", self._K)
+            self._radiating.append((matrix, radiation(factor)))
 
     def _weigh_direction(self, M: PETSc.Mat, direction: int) -> PETSc.Vec:
         r, Mr = M.createVecs()
@@ -217,16 +227,9 @@ class Equations:
             terms.append((self._stiffness("imaginary", imaginary), hysteretic))
         if "geometric" in self._constrained:
             terms.append((self._constrained["geometric"], constant))
-        if not self.base_is_held:
-            terms.append((self._constrained["base"], self._radiation()))
+        terms += self._radiating
         system = DynamicSystem(terms, self._constrained["mass"], self._damping(K, ground, real))
         return LapseEquations(system, _LineLoads(self) if self._side_forces else self._inertia)
-
-    def _radiation(self) -> ScalarFunction:
-        """Of the dashpots ρV* at the base, with the complex modulus of the rock."""
-        rock = self._scene.boundary.rock
-        assert rock is not None
-        return radiation(complex(complex_factor(rock.damping, self._scene.solver.complex_modulus)))
 
     def _damping(
         self, K: PETSc.Mat, ground: Ground, constants: ElasticConstants

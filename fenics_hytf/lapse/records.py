@@ -80,7 +80,7 @@ class LapseResult:
         solved_lines: Lines solved (each counted once, whatever the number of iterations).
         factorisations: Factorisations over all iterations.
         solves: Solves over all iterations.
-        worst_residual: Largest relative true residual of the final sweep [-].
+        worst_residual: Largest relative residual of the final sweep [-].
         loop: History of the equivalent-linear loop; empty without it.
         frequency: Solved lines [Hz], shape ``(solved_lines,)``.
         transfer: Total acceleration over the input as given, shape

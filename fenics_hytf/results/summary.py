@@ -21,6 +21,7 @@ from fenics_hytf.motion import GRAVITY, Intensity, intensity_measures
 from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.layers import layer_states
 from fenics_hytf.results.writers import QUANTITIES, base_motions
+from fenics_hytf.soil import LimitedCurve
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
@@ -107,6 +108,32 @@ def warnings(result: Result) -> list[str]:
             found.append(
                 f"Effective strains reach {100 * strain:.2g} %. Above about 1 % an equivalent-"
                 "linear analysis is outside the range it was made for."
+            )
+    found += _exceeded_strengths(result)
+    return found
+
+
+def _exceeded_strengths(result: Result) -> list[str]:
+    """Soils whose peak stress is above the strength that limits their curves.
+
+    The curve is read at the effective strain, the peak stress goes with the peak strain.
+    """
+    found = []
+    if result.scene.effects.equivalent_linear is None:
+        return found
+    for name, soil in result.scene.soil.items():
+        curve = soil.curve
+        if name not in result.region_names or not isinstance(curve, LimitedCurve):
+            continue
+        number = result.region_names.index(name)
+        stresses = [c.peak_stress[c.region == number] for c in (i.cells for i in result.lapses)]
+        peak = max((float(np.nanmax(s, initial=0.0)) for s in stresses), default=0.0)
+        strength = curve.strength * soil.elastic.shear_modulus
+        if peak > strength:
+            found.append(
+                f"Soil {name}: peak shear stresses reach {peak / 1e3:.3g} kPa, above the strength "
+                f"of {strength / 1e3:.3g} kPa. The curve limits the stress at the effective "
+                "strain; peaks go with the peak strain."
             )
     return found
 

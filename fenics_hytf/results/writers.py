@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import default_periods, response_spectrum
+from fenics_hytf.results.overburden import vertical_stress
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
@@ -177,9 +178,6 @@ CELL_VALUES = (
 
 def _cells(result: Result) -> tuple[list[str], Rows]:
     """Values of the cells, one block a lapse."""
-    # the solver's room takes a second to load: who only draws does without
-    from fenics_hytf.simulation.overburden import vertical_stress
-
     centroid = result.lapses[0].cells.centroid
     places = ["x", "y", "z"][: centroid.shape[1]]
     names = np.array(result.region_names, dtype=object)

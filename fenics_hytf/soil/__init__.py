@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Soil: elastic constants, complex modulus, equivalent-linear curves. Knows no mesh and no MPI."""
 
-from fenics_hytf.soil.complex_modulus import COMPLEX_MODULUS, complex_factor
+from fenics_hytf.soil.complex_modulus import COMPLEX_MODULUS, complex_factor, wave_factors
 from fenics_hytf.soil.curves import Curve
 from fenics_hytf.soil.darendeli import darendeli
 from fenics_hytf.soil.elastic import Elastic
@@ -33,4 +33,5 @@ __all__ = [
     "read_curve_file",
     "seed_idriss_1970",
     "vucetic_dobry_1991",
+    "wave_factors",
 ]

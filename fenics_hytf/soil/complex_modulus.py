@@ -6,7 +6,7 @@ of ω, at ω = 0 the modulus is real. The conventions agree to first order in D:
 
 ==============  ==================================  =============================================
 ``hysteretic``  G (1 + 2iD)                         constant real part
-``kramer``      G (1 - D² + 2iD)                    Kramer (1996), so that √G* ≈ √G (1 + iD)
+``kramer``      G (1 - D² + 2iD)                    Kramer (1996), so that √G* = √G (1 + iD)
 ``shake91``     G (1 - 2D² + 2iD √(1 - D²))         Udaka (1975), Idriss and Sun (1992): |G*| = G
 ``dormieux``    G (√(1 - 4D²) + 2iD)                Dormieux and Canou (1990): |G*| = G
 ==============  ==================================  =============================================
@@ -111,6 +111,30 @@ def complex_factor(damping: npt.ArrayLike, convention: str = "hysteretic") -> Co
             f"complex_modulus: found '{convention}'; expected one of {', '.join(COMPLEX_MODULUS)}"
         )
     return COMPLEX_MODULUS[convention](damping)
+
+
+def wave_factors(
+    damping: float, poisson: float, convention: str = "hysteretic", keep: str = "poisson"
+) -> tuple[complex, complex]:
+    """Complex over real modulus of P and of S waves, M*/M and G*/G, at positive frequencies.
+
+    Args:
+        damping: Damping ratio of shear D [-].
+        poisson: Poisson's ratio of the real moduli [-].
+        convention: A key of `COMPLEX_MODULUS`.
+        keep: ``"poisson"``: both moduli take the factor G*/G; ``"bulk"``: M* = K + 4G*/3.
+
+    Returns:
+        The two factors [-].
+
+    Raises:
+        ValueError: If the convention is unknown or the damping ratio is out of range.
+    """
+    shear = complex(complex_factor(damping, convention))
+    if keep == "poisson":
+        return shear, shear
+    share = 4 / 3 * (1 - 2 * poisson) / (2 - 2 * poisson)  # of 4G/3 in M
+    return 1 - share + share * shear, shear
 
 
 def _checked(damping: npt.ArrayLike, convention: str, limit: float) -> npt.NDArray[np.float64]:

@@ -13,8 +13,8 @@ Foundations 33(1), 1993, 182-191. With the strain γ as a ratio and the stress �
         2.7e-5 PI^1.115      PI > 70
     D = 0.1665 (1 + exp(-0.0145 PI^1.3)) (0.586 (G/G_max)² - 1.547 G/G_max + 1)
 
-The fit exceeds G/G_max = 1 at small strain where the stress is high, by up to 2 % at 100 kPa and
-14 % at 1 MPa, according to PI; it is taken as 1 there, in the damping too.
+The fit exceeds G/G_max = 1 at small strain where the stress is high, by up to 3 % at 100 kPa and
+15 % at 1 MPa, according to PI; it is taken as 1 there, in the damping too.
 """
 
 from __future__ import annotations

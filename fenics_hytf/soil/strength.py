@@ -13,7 +13,9 @@ same tangent G₁ and tends to the strength τ_f:
 The damping ratio is left as it is. The authors ask for a transition strain with τ₁ <= 0.3 τ_f; the
 largest such strain is taken here unless another is given, so that the curve stays as it is
 wherever the stress is below 0.3 of the strength. The hyperbola holds at every strain above, within
-the table and beyond it: the stress never falls and never exceeds the strength.
+the table and beyond it: the stress of the curve never falls and never exceeds the strength. An
+equivalent-linear analysis reads the curve at the effective strain; its peak stress, |G*| times the
+peak strain, may be larger by 1/ratio.
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ from support.grids import damped, dynamic_stiffness, matrix, split, springs, vec
 from fenics_hytf.frequency import (
     DynamicSystem,
     ReductionError,
+    SweepError,
     constant,
     direct_sweep,
     hysteretic,
@@ -140,7 +141,22 @@ def test_a_budget_that_is_too_small_names_the_lines():
     with pytest.raises(ReductionError) as caught:
         reduced_sweep(damped(parts), b, LINES, TOLERANCE, budget=2)
     assert len(caught.value.lines) and set(caught.value.lines) <= set(LINES)
-    assert "budget" in str(caught.value) and "direct sweep" in str(caught.value)
+    assert "budget" in str(caught.value) and "solver.sweep" in str(caught.value)
+
+
+@pytest.mark.parametrize("line", [3, 60, 117])
+def test_an_undamped_resonance_is_an_error(line):
+    """Wherever it lies: where a matrix is factorised, or between."""
+    from scipy.linalg import eigh
+
+    parts = springs(7, 8)
+    modes = np.sqrt(eigh(parts["K"].toarray(), parts["M"].toarray(), eigvals_only=True))
+    lines = LINES.copy()
+    lines[line] = 1j * modes[np.argmin(abs(modes - abs(LINES[line])))]
+    system = DynamicSystem(matrix(parts["K"]), matrix(parts["M"]))
+    b = vector(np.random.default_rng(13).normal(size=56))
+    with pytest.raises(SweepError):
+        reduced_sweep(system, b, lines, TOLERANCE)
 
 
 def test_progress_counts_lines():

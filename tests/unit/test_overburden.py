@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fenics_hytf.results.overburden import vertical_stress
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation.overburden import vertical_stress
 
 G0, WATER = 9.80665, 9806.65
 SAND, CLAY, FILL = 1900.0, 1700.0, 1600.0

@@ -13,6 +13,7 @@ import pytest
 from fenics_hytf.motion import intensity_measures
 from fenics_hytf.results import open_result, publish
 from fenics_hytf.results.report.conventions import method
+from fenics_hytf.results.summary import warnings
 from tests.unit.results_builder import ROCK, make_result
 
 MOTION_X = ("histories_x", "transfer_x", "spectra_x", "fourier_x")
@@ -237,3 +238,14 @@ def test_the_report_tells_figures_with_their_digits(tmp_path):
     assert re.search(r"r0 0\.5, 24 x 0\.500 2\.50 0\.300 0\.00750 15\.0", text)
     assert "Components that do not move are left out." in text
     assert "darendeli" not in text and "table of 3 strains" in text
+
+
+@pytest.mark.parametrize(("strength", "told"), [(1e9, False), (2e3, True)])
+def test_a_peak_stress_above_the_strength_is_told(strength, told):
+    curves = {"model": "darendeli", "plasticity_index": 0, "mean_stress": 50e3}
+    soil = {"density": 1800.0, "shear_wave_velocity": 200.0, "poisson": 0.3}
+    limited = soil | {"curves": curves | {"shear_strength": strength}}
+    result = make_result(soil={"fill": limited, "sand": soil | {"curves": curves}})
+    found = [text for text in warnings(result) if "strength" in text]
+    assert len(found) == told
+    assert not told or found[0].startswith("Soil fill: peak shear stresses reach")

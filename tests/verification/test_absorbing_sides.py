@@ -24,6 +24,7 @@ from fenics_hytf.scene import Scene
 CLOSED_FORM = json.loads((DATA / "analytic_2d.json").read_text())["lysmer_kuhlemeyer_reflection"]
 DENSITY, SPEED = 2000.0, 100.0  # [kg/m3], of shear waves [m/s]
 WIDTH, LENGTH = 10.0, 40.0  # of the strip, along the side and across [m]
+LIMIT = 0.01  # percentage points; at 30 degrees P waves send back 0.02 to 0.03 % of their energy
 PER_CELL = 0.625  # [m], of degree 2: 16 cells a shear wave where one is 10 m long
 
 
@@ -119,7 +120,7 @@ def test_shear_waves_across_the_plane(degrees, figure):
     figure(
         f"SH, {degrees} deg: energy back, % (closed form {100 * expected:.3f})",
         100 * abs(energy - expected),
-        1.0,
+        LIMIT,
         "points",
     )
 
@@ -179,7 +180,7 @@ def test_waves_in_the_plane(kind, poisson, degrees, figure):
     figure(
         f"{kind}, nu {poisson}, {degrees} deg: energy back, % (closed form {100 * expected:.3f})",
         100 * abs(energy - expected),
-        1.0,
+        LIMIT,
         "points",
     )
 
@@ -187,8 +188,8 @@ def test_waves_in_the_plane(kind, poisson, degrees, figure):
 def layered_reflection(omega: float, thickness: float, damping: float) -> complex:
     """A P wave that meets a free end behind the layer, cell by cell, of ν = 0.25."""
     modulus = 3 * DENSITY * SPEED**2
-    centres = np.arange(PER_CELL / 2, thickness, PER_CELL)[::-1]  # from the inner edge outwards
-    factors = 1 + 2j * damping * (1 - (thickness - centres[::-1]) / thickness) ** 2
+    centres = np.arange(PER_CELL / 2, thickness, PER_CELL)  # from the inner edge outwards
+    factors = 1 + 2j * damping * (centres / thickness) ** 2
     impedance = np.sqrt(DENSITY * modulus * factors)
     k = omega * np.sqrt(DENSITY / (modulus * factors))
     load = 0.0  # impedance of what is beyond: nothing

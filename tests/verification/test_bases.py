@@ -90,6 +90,39 @@ def outcrop_over_within(omega, density, modulus) -> np.ndarray:
     return 1 - tau / (1j * omega * np.sqrt(density[2] * modulus[2]) * u)
 
 
+def test_rock_that_keeps_its_bulk_modulus(tmp_path, figure):
+    """P waves: M* = K + 4G*/3 in the soils and in the rock."""
+    motion = comb(tmp_path / f"comb{MPI.COMM_WORLD.rank}.csv", np.arange(1, 80), SAMPLES, DT)
+    rock = ROCK | {"damping": 0.1}
+    scene = column(
+        [motion | {"direction": "y", "input": "outcrop"}],
+        boundary={"left": "tied", "right": "tied", "base": {"compliant": rock}},
+        solver={"keep": "bulk"},
+    )
+    lapse = simulate(scene).lapses[0]
+    density, modulus = [], []
+    for s in (*SOIL.values(), rock):
+        shear = s["density"] * s["shear_wave_velocity"] ** 2
+        nu = s["poisson"]
+        bulk = shear * 2 * (1 + nu) / (3 * (1 - 2 * nu))
+        density.append(s["density"])
+        modulus.append(bulk + 4 / 3 * shear * (1 + 2j * s["damping"]))
+    omega = 2 * np.pi * lapse.frequency
+    over_within = two_layer_transfer(omega, LAYERS, tuple(density[:2]), tuple(modulus[:2]))
+    expected = over_within / outcrop_over_within(omega, density, modulus)
+    error = np.max(abs(lapse.transfer[0, 1, 0] - expected) / abs(expected))
+    figure("two layers on rock, y, bulk modulus kept: transfer function", 100 * error, 0.01, "%")
+    assert scene.boundary.rock.damping == 0.1
+
+
+@pytest.mark.parametrize("sides", ["free", "dashpot", "roller"])
+def test_no_outcrop_motion_where_the_sides_take_a_part(sides, tmp_path):
+    motion = wide(tmp_path / f"x{MPI.COMM_WORLD.rank}.csv", "x", "within")
+    boundary = {"left": sides, "right": sides, "base": {"compliant": ROCK}}
+    result = simulate(column([motion], boundary=boundary))
+    assert result.outcrop_acceleration is None
+
+
 @pytest.mark.parametrize("loop", [False, True])
 def test_within_and_outcrop_lead_to_each_other(loop, tmp_path, figure):
     rank = MPI.COMM_WORLD.rank
