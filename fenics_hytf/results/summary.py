@@ -118,7 +118,7 @@ def _exceeded_strengths(result: Result) -> list[str]:
 
     The curve is read at the effective strain, the peak stress goes with the peak strain.
     """
-    found = []
+    found: list[str] = []
     if result.scene.effects.equivalent_linear is None:
         return found
     for name, soil in result.scene.soil.items():
