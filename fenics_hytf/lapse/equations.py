@@ -109,6 +109,11 @@ class Equations:
         self._loaded: list[PETSc.Vec] = []
 
     @property
+    def gdim(self) -> int:
+        """Space dimension."""
+        return self._domain.gdim
+
+    @property
     def num_unknowns(self) -> int:
         """Unknowns of all ranks."""
         return int(self.T.getSize()[1])
