@@ -243,4 +243,4 @@ def direct_sweep(
             count = factorisation.factorisations
     finally:
         column.destroy()
-    return DenseSweep(system.comm, lines, values, residuals, count, residuals.size)
+    return DenseSweep(lines, values, residuals, count, residuals.size)

@@ -40,7 +40,7 @@ class TermProducts:
         self.functions = [function for _, function in system.terms]
         self.comm: MPI.Comm = system.comm.tompi4py()
         self._matrices = [matrix for matrix, _ in system.terms]
-        self._local = [_real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
+        self._local = [real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
 
     def __len__(self) -> int:
         return len(self.functions)
@@ -56,8 +56,7 @@ class TermProducts:
             Shape ``(num_local, n)``.
         """
         if self._local:
-            pairs = np.ascontiguousarray(X).view(np.float64)
-            return np.ascontiguousarray(self._local[term] @ pairs).view(np.complex128)
+            return times(self._local[term], X)
         matrix = self._matrices[term]
         block = PETSc.Mat().createDense(
             ((X.shape[0], None), (None, X.shape[1])),
@@ -71,12 +70,26 @@ class TermProducts:
         return np.asarray(result, np.complex128)
 
 
-def _real_rows(matrix: PETSc.Mat) -> sparse.csr_matrix:
-    """A real matrix without the zeros that only the common pattern holds."""
+def real_rows(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """A serial real matrix without the zeros that only the common pattern holds."""
     start, columns, values = matrix.getValuesCSR()
     rows = sparse.csr_matrix((values.real.copy(), columns, start), shape=matrix.getSize())
     rows.eliminate_zeros()
     return rows
+
+
+def times(matrix: sparse.csr_matrix, block: ComplexArray) -> ComplexArray:
+    """A real sparse matrix times a complex block.
+
+    Args:
+        matrix: Shape ``(m, n)``.
+        block: Shape ``(n, k)``.
+
+    Returns:
+        Shape ``(m, k)``.
+    """
+    pairs = np.ascontiguousarray(block).view(np.float64)
+    return np.ascontiguousarray(matrix @ pairs).view(np.complex128)
 
 
 def taylor(function: ScalarFunction, s: complex, order: int, radius: float) -> ComplexArray:
@@ -123,7 +136,7 @@ def krylov_block(
     coefficients = [taylor(f, s, order, radius) for f in products.functions] if radius else []
     comm = products.comm
     length = _norm(comm, first)
-    Q = np.empty((len(first), steps), np.complex128, order="F")
+    Q = np.empty((len(first), steps), np.complex128)
     if length == 0.0:
         return Q[:, :0]
     Q[:, 0] = first / length
@@ -156,10 +169,25 @@ def krylov_block(
 
 def _against(comm: MPI.Comm, Q: ComplexArray, w: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Overlap of w with an orthonormal basis, and what is left of it."""
-    overlap = comm.allreduce(Q.conj().T @ w)
+    overlap = inner(comm, Q, w)
     rest = w - Q @ overlap
-    again = comm.allreduce(Q.conj().T @ rest)
+    again = inner(comm, Q, rest)
     return overlap + again, rest - Q @ again
+
+
+def inner(comm: MPI.Comm, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Inner products leftᴴ right over all ranks, without a copy of the left block.
+
+    Args:
+        comm: Communicator.
+        left: Shape ``(num_local, n)``.
+        right: Shape ``(num_local,)`` or ``(num_local, m)``.
+
+    Returns:
+        Shape ``(n,)`` or ``(n, m)``.
+    """
+    product = np.conj(left.T @ np.conj(right))
+    return product if comm.size == 1 else np.asarray(comm.allreduce(product))
 
 
 def _norm(comm: MPI.Comm, x: ComplexArray) -> float:

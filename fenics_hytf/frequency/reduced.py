@@ -12,17 +12,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
-from scipy.linalg.blas import zgemm
 
 from fenics_hytf.frequency.direct import RESONANCE, SymmetricFactorisation
 from fenics_hytf.frequency.errors import ReductionError, ResonanceError
-from fenics_hytf.frequency.krylov import TermProducts, krylov_block
+from fenics_hytf.frequency.krylov import TermProducts, inner, krylov_block, real_rows, times
 from fenics_hytf.frequency.loads import LoadFactors, Loads, factor_loads
 from fenics_hytf.frequency.system import DynamicSystem
 
@@ -52,7 +52,6 @@ class ReducedSweep:
         basis: V on this rank, orthonormal, shape ``(num_local, size)``.
         coordinates: y, shape ``(size, num_sides, num_lines)``.
         expansions: Lines at which a matrix was factorised.
-        comm: Communicator.
     """
 
     s: ComplexArray
@@ -62,7 +61,6 @@ class ReducedSweep:
     basis: ComplexArray
     coordinates: ComplexArray
     expansions: tuple[int, ...]
-    comm: PETSc.Comm
 
     def solution(self, k: int) -> ComplexArray:
         """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
@@ -71,10 +69,29 @@ class ReducedSweep:
     def project(self, rows: PETSc.Mat) -> ComplexArray:
         """Multiply every solution by a matrix; see :class:`Sweep`."""
         _, num_sides, num_lines = self.coordinates.shape
-        seen = _multiply(rows, self.basis)
+        seen = self._seen_by(rows)
         return (seen @ self.coordinates.reshape(len(self.coordinates), -1)).reshape(
             len(seen), num_sides, num_lines
         )
+
+    def _seen_by(self, rows: PETSc.Mat) -> ComplexArray:
+        """This rank's rows of a matrix times the basis, shape ``(num_local_rows, size)``."""
+        if rows.comm.size == 1:
+            return times(real_rows(rows), self.basis)
+        columns = self._columns
+        dense = PETSc.Mat().createDense(
+            ((columns.shape[0], None), (None, columns.shape[1])), array=columns, comm=rows.comm
+        )
+        product = rows.matMult(dense)
+        result = product.getDenseArray().copy()
+        product.destroy()
+        dense.destroy()
+        return np.asarray(result, np.complex128)
+
+    @cached_property
+    def _columns(self) -> ComplexArray:
+        """The basis as PETSc keeps it, column by column."""
+        return np.asfortranarray(self.basis)
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""
@@ -151,7 +168,8 @@ class _Growth:
         self._mass = next(i for i, (m, _) in enumerate(system.terms) if m is system.mass)
         self._loads = loads
         count, num_loads = loads.vectors.shape
-        self._V: ComplexArray = np.empty((count, 0), np.complex128, order="F")
+        self._storage = np.empty((count, 0), np.complex128)
+        self._size = 0
         self._reduced_load: ComplexArray = np.empty((0, num_loads), np.complex128)
         self._sketch = _sketch_matrix(count, self._comm.rank)
         self._factors = np.array(
@@ -160,7 +178,7 @@ class _Growth:
         terms = len(self._products)
         self._reduced = [np.empty((0, 0), np.complex128)] * terms
         self._sketched = [np.empty((_SKETCH, 0), np.complex128)] * terms
-        self._sketched_load = self._comm.allreduce(_times(self._sketch, loads.vectors))
+        self._sketched_load = self._comm.allreduce(times(self._sketch, loads.vectors))
         self.residuals = np.full(loads.norms.shape, np.inf)
         self._solved: dict[int, ComplexArray] = {}  # coordinates of lines that were factorised
         self.expansions: list[int] = []
@@ -213,29 +231,40 @@ class _Growth:
         if not fresh.shape[1]:
             return
         old = self._V.shape[1]
-        self._V = np.asfortranarray(np.concatenate([self._V, fresh], axis=1))
+        self._append(fresh)
         mine = self._inner(fresh, self._loads.vectors)
         self._reduced_load = np.concatenate([self._reduced_load, mine])
         for term in range(len(self._products)):
-            image = np.asfortranarray(self._products(term, fresh))
+            image = self._products(term, fresh)
             border = self._inner(self._V, image)
             grown = np.empty((len(border), len(border)), np.complex128)
             grown[:old, :old] = self._reduced[term]
             grown[:, old:] = border
             grown[old:, :old] = border[:old].conj().T  # K_j is real and symmetric
             self._reduced[term] = grown
-            sketched = self._comm.allreduce(_times(self._sketch, image))
+            sketched = self._comm.allreduce(times(self._sketch, image))
             self._sketched[term] = np.concatenate([self._sketched[term], sketched], axis=1)
 
+    @property
+    def _V(self) -> ComplexArray:
+        """The basis, orthonormal, shape ``(num_local, size)``."""
+        return self._storage[:, : self._size]
+
+    def _append(self, fresh: ComplexArray) -> None:
+        """Add columns to the basis, whose storage grows by half where it is full."""
+        size = self._size + fresh.shape[1]
+        if size > self._storage.shape[1]:
+            grown = np.empty((len(fresh), size + size // 2), np.complex128)
+            grown[:, : self._size] = self._V
+            self._storage = grown
+        self._storage[:, self._size : size] = fresh
+        self._size = size
+
     def _inner(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-        if not left.shape[1]:
-            return np.empty((0, right.shape[1]), np.complex128)
-        product = zgemm(1.0, left, np.asfortranarray(right), trans_a=2)
-        return np.asarray(self._comm.allreduce(product))
+        return inner(self._comm, left, right)
 
     def _orthonormalise(self, block: ComplexArray, drop: float) -> ComplexArray:
         """Principal directions of a block that are more than round-off."""
-        block = np.asfortranarray(block)
         power, directions = np.linalg.eigh(self._inner(block, block))
         kept = power > drop**2
         return block @ (directions[:, kept] / np.sqrt(power[kept]))
@@ -349,7 +378,6 @@ class _Growth:
             self._V,
             y,
             tuple(self.expansions),
-            self._factorisation.A.comm,
         )
 
 
@@ -360,23 +388,3 @@ def _sketch_matrix(count: int, rank: int) -> sparse.csr_matrix:
     signs = random.choice([-1.0, 1.0], size=(count, 2)) / np.sqrt(2.0)
     columns = np.repeat(np.arange(count), 2)
     return sparse.csr_matrix((signs.ravel(), (sums.ravel(), columns)), shape=(_SKETCH, count))
-
-
-def _times(matrix: sparse.csr_matrix, block: ComplexArray) -> ComplexArray:
-    """A real sparse matrix times a complex block."""
-    pairs = np.ascontiguousarray(block).view(np.float64)
-    return np.ascontiguousarray(matrix @ pairs).view(np.complex128)
-
-
-def _multiply(rows: PETSc.Mat, block: ComplexArray) -> ComplexArray:
-    """This rank's rows of a matrix times the block that all ranks hold parts of."""
-    dense = PETSc.Mat().createDense(
-        ((block.shape[0], None), (None, block.shape[1])),
-        array=np.asfortranarray(block),
-        comm=rows.comm,
-    )
-    product = rows.matMult(dense)
-    result = product.getDenseArray().copy()
-    product.destroy()
-    dense.destroy()
-    return np.asarray(result, np.complex128)

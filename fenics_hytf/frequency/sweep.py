@@ -59,7 +59,6 @@ class DenseSweep:
     """A sweep that holds every solution.
 
     Args:
-        comm: Communicator.
         s: Complex frequencies [rad/s], shape ``(num_lines,)``.
         values: This rank's part of the solutions, a column each, all sides of a line together,
             shape ``(num_local, num_lines·num_sides)``, Fortran order.
@@ -70,7 +69,6 @@ class DenseSweep:
 
     def __init__(
         self,
-        comm: PETSc.Comm,
         s: ComplexArray,
         values: ComplexArray,
         residuals: npt.NDArray[np.float64],
@@ -81,7 +79,6 @@ class DenseSweep:
         self.residuals = residuals
         self.factorisations = factorisations
         self.solves = solves
-        self._comm = comm
         self._values = values
         self._sides = residuals.shape[1]
 
@@ -96,7 +93,7 @@ class DenseSweep:
         if count == 0:
             return np.empty((shape[0], shape[2], 0), np.complex128)
         everything = PETSc.Mat().createDense(
-            ((num_local, None), (None, count)), array=self._values, comm=self._comm
+            ((num_local, None), (None, count)), array=self._values, comm=rows.comm
         )
         product = rows.matMult(everything)
         result = product.getDenseArray().reshape(shape).transpose(0, 2, 1).copy()
