@@ -11,7 +11,7 @@ from fenics_hytf.motion import GRAVITY
 from fenics_hytf.results import moving_components
 
 _MOST = 12  # receivers listed
-_SMALLEST = 1e-6  # mm or g: less is rounding
+_ROUNDING = 1e-9  # of the largest peak of its kind
 
 
 def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
@@ -61,10 +61,18 @@ def _base(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _peaks(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Peaks of the components that move, one row a receiver."""
     rows: list[tuple[str, str]] = []
+    everything = [
+        (key, value or 0.0) for p in summary["peaks"].values() for key, value in p.items()
+    ]
+    # of displacement and acceleration each: what is less than this is rounding
+    least = {
+        letter: _ROUNDING * max((v for key, v in everything if key[0] == letter), default=0.0)
+        for letter in "Au"
+    }
     for name, peaks in list(summary["peaks"].items())[:_MOST]:
         text = "; ".join(
-            f"{c}: total acceleration {_figure(peaks[f'A_{c}'], 1 / GRAVITY)} g, "
-            f"displacement {_figure(peaks[f'u_{c}'], 1e3)} mm"
+            f"{c}: total acceleration {_figure(peaks[f'A_{c}'], 1 / GRAVITY, least['A'])} g, "
+            f"displacement {_figure(peaks[f'u_{c}'], 1e3, least['u'])} mm"
             for c in moving_components(summary, name)
         )
         rows.append(("peaks" if not rows else "", f"{name}  {text}"))
@@ -74,9 +82,8 @@ def _peaks(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def _figure(value: float | None, factor: float) -> str:
+def _figure(value: float | None, factor: float, least: float) -> str:
     """A figure in other units; a receiver whose point has left the mesh has none."""
     if value is None:
         return "-"
-    scaled = factor * value
-    return f"{scaled:.3g}" if scaled >= _SMALLEST else "0"
+    return f"{factor * value:.3g}" if value > least else "0"

@@ -25,7 +25,7 @@ RealArray = npt.NDArray[np.float64]
 FORMATS = ("at2", "csv")
 TOTAL = "total_acceleration"
 BASE = ("within", "outcrop")
-"""Names of the base's motions; a receiver of that name comes first."""
+"""Names of the base's motions; no receiver has them."""
 
 _LETTERS = {name: letter for letter, name in QUANTITIES.items()}
 _UNITS = {"displacement": "m", "velocity": "m/s"}
@@ -123,10 +123,9 @@ def _check_request(request: ExportRequest, summary: Mapping[str, Any]) -> None:
 
 
 def _base_names(summary: Mapping[str, Any]) -> list[str]:
-    """Motions of the base that are known, unless a receiver has taken the name."""
+    """Motions of the base that are known."""
     base = summary["base"].values()
-    known = [kind for kind in BASE if all(b[f"{kind}_pga_g"] is not None for b in base)]
-    return [kind for kind in known if kind not in summary["receivers"]]
+    return [kind for kind in BASE if all(b[f"{kind}_pga_g"] is not None for b in base)]
 
 
 def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Motion]:

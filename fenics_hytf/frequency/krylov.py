@@ -20,6 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
 
+from fenics_hytf.frequency.loads import inner
 from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -173,21 +174,6 @@ def _against(comm: MPI.Comm, Q: ComplexArray, w: ComplexArray) -> tuple[ComplexA
     rest = w - Q @ overlap
     again = inner(comm, Q, rest)
     return overlap + again, rest - Q @ again
-
-
-def inner(comm: MPI.Comm, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-    """Inner products leftᴴ right over all ranks, without a copy of the left block.
-
-    Args:
-        comm: Communicator.
-        left: Shape ``(num_local, n)``.
-        right: Shape ``(num_local,)`` or ``(num_local, m)``.
-
-    Returns:
-        Shape ``(n,)`` or ``(n, m)``.
-    """
-    product = np.conj(left.T @ np.conj(right))
-    return product if comm.size == 1 else np.asarray(comm.allreduce(product))
 
 
 def _norm(comm: MPI.Comm, x: ComplexArray) -> float:

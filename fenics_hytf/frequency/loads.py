@@ -55,13 +55,18 @@ class LoadFactors:
 
 
 def factor_loads(
-    b: PETSc.Vec | Sequence[PETSc.Vec] | Loads, num_lines: int, comm: MPI.Comm, tolerance: float
+    b: PETSc.Vec | Sequence[PETSc.Vec] | Loads,
+    num_lines: int,
+    num_local: int,
+    comm: MPI.Comm,
+    tolerance: float,
 ) -> LoadFactors:
     """Find the vectors that hold all loads (collective).
 
     Args:
         b: One or several right-hand sides, or those of each line.
         num_lines: Number of lines.
+        num_local: Unknowns of this rank.
         comm: Communicator of the vectors.
         tolerance: What may be left of a load, relative [-].
 
@@ -69,7 +74,7 @@ def factor_loads(
         The factors.
     """
     if callable(b):
-        return _gathered(b, num_lines, comm, tolerance)
+        return _gathered(b, num_lines, num_local, comm, tolerance)
     sides = [b] if isinstance(b, PETSc.Vec) else list(b)
     vectors = np.stack([side.array_r for side in sides], axis=1)
     every = np.broadcast_to(np.eye(len(sides))[:, :, None], (len(sides), len(sides), num_lines))
@@ -77,9 +82,11 @@ def factor_loads(
     return LoadFactors(vectors.astype(np.complex128), every.astype(np.complex128), norms)
 
 
-def _gathered(loads: Loads, num_lines: int, comm: MPI.Comm, tolerance: float) -> LoadFactors:
+def _gathered(
+    loads: Loads, num_lines: int, num_local: int, comm: MPI.Comm, tolerance: float
+) -> LoadFactors:
     """Gram and Schmidt, line by line: a load that the vectors do not hold becomes one."""
-    vectors: list[ComplexArray] = []
+    W = np.empty((num_local, 0), np.complex128)
     norms = np.ones((num_lines, len(loads)))
     found: list[list[ComplexArray]] = []
     for line in range(num_lines):
@@ -87,19 +94,35 @@ def _gathered(loads: Loads, num_lines: int, comm: MPI.Comm, tolerance: float) ->
         for side, load in enumerate(loads(line)):
             rest, length = load.array_r.copy(), load.norm()
             norms[line, side] = length or 1.0
-            c: ComplexArray = np.zeros(len(vectors), np.complex128)
-            W = np.stack(vectors, axis=1) if vectors else np.empty((len(rest), 0), np.complex128)
+            c: ComplexArray = np.zeros(W.shape[1], np.complex128)
             for _ in range(2):
-                overlap = comm.allreduce(W.conj().T @ rest)
+                overlap = inner(comm, W, rest)
                 rest -= W @ overlap
                 c += overlap
             left = float(np.sqrt(comm.allreduce(float(np.vdot(rest, rest).real))))
             if left > tolerance * norms[line, side]:
-                vectors.append(rest / left)
+                W = np.column_stack([W, rest / left])
                 c = np.append(c, left)
             found[-1].append(c)
-    coordinates = np.zeros((len(vectors), len(loads), num_lines), np.complex128)
+    if not W.shape[1]:  # loads of nought, or no line: one vector of nought holds them
+        W = np.zeros((num_local, 1), np.complex128)
+    coordinates = np.zeros((W.shape[1], len(loads), num_lines), np.complex128)
     for line, sides in enumerate(found):
         for side, c in enumerate(sides):
             coordinates[: len(c), side, line] = c
-    return LoadFactors(np.stack(vectors, axis=1), coordinates, norms)
+    return LoadFactors(W, coordinates, norms)
+
+
+def inner(comm: MPI.Comm, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Inner products leftᴴ right over all ranks, without a copy of the left block.
+
+    Args:
+        comm: Communicator.
+        left: Shape ``(num_local, n)``.
+        right: Shape ``(num_local,)`` or ``(num_local, m)``.
+
+    Returns:
+        Shape ``(n,)`` or ``(n, m)``.
+    """
+    product = np.conj(left.T @ np.conj(right))
+    return product if comm.size == 1 else np.asarray(comm.allreduce(product))

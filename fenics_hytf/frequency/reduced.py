@@ -22,8 +22,8 @@ from scipy import sparse
 
 from fenics_hytf.frequency.direct import RESONANCE, SymmetricFactorisation
 from fenics_hytf.frequency.errors import ReductionError, ResonanceError
-from fenics_hytf.frequency.krylov import TermProducts, inner, krylov_block, real_rows, times
-from fenics_hytf.frequency.loads import LoadFactors, Loads, factor_loads
+from fenics_hytf.frequency.krylov import TermProducts, krylov_block, real_rows, times
+from fenics_hytf.frequency.loads import LoadFactors, Loads, factor_loads, inner
 from fenics_hytf.frequency.system import DynamicSystem
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -133,7 +133,8 @@ def reduced_sweep(
     allowed = len(lines) if budget is None else budget
     with SymmetricFactorisation(system) as factorisation:
         comm = system.comm.tompi4py()
-        loads = factor_loads(b, len(lines), comm, _LOAD_ERROR * tolerance)
+        num_local = system.mass.getLocalSize()[0]
+        loads = factor_loads(b, len(lines), num_local, comm, _LOAD_ERROR * tolerance)
         growth = _Growth(system, factorisation, loads, lines, tolerance)
         wanted = list(expansions) or ([len(lines) // 2] if len(lines) else [])
         size = block
@@ -298,7 +299,7 @@ class _Growth:
             self.residuals[some] = np.linalg.norm(left, axis=0).T / self._loads.norms[some]
 
     def _coordinates(self, lines: npt.NDArray[np.intp]) -> ComplexArray:
-        """Y of some lines, shape ``(size, num_sides, len(lines))``."""
+        """Reduced coordinates y of some lines, shape ``(size, num_sides, len(lines))``."""
         A = np.tensordot(self._factors[:, lines], np.stack(self._reduced), axes=(0, 0))
         right = np.tensordot(self._reduced_load, self._loads.coordinates[:, :, lines], axes=1)
         y = np.linalg.solve(A, right.transpose(2, 0, 1))

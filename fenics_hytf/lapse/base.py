@@ -2,8 +2,8 @@
 """The motion of the base, as a within and as an outcrop motion.
 
 A *within* motion is the total motion of the base, of a section its mean along the base; an
-*outcrop* motion is that of the bare rock. The
-dashpots of the rock tell one from the other, for they carry the traction of the base:
+*outcrop* motion is that of the bare rock. The dashpots of the rock tell one from the other, for
+they carry the traction of the base:
 
     τ = ρV* (v_outcrop − v_within)
 """

@@ -33,7 +33,7 @@ class Rock(Table):
         density: Mass density [kg/m^3].
         shear_wave_velocity: [m/s].
         poisson: Poisson's ratio [-].
-        damping: Damping ratio, the same of P and S waves [-].
+        damping: Damping ratio of shear [-]; what P waves have of it, ``solver.keep`` says.
     """
 
     density: Positive = Field(description="a positive number [kg/m3]")

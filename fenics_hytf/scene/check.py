@@ -255,7 +255,7 @@ def _damping_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
         return
     solver, effects = raw.get("solver"), raw.get("effects")
     law = solver.get("complex_modulus") if isinstance(solver, dict) else None
-    if law in _MOST_DAMPING:
+    if isinstance(law, str) and law in _MOST_DAMPING:
         for name, soil in soils.items():
             yield from _damping_limit(law, soil, join_key("soil", name_key(name)), sections.folder)
         base = raw["boundary"].get("base") if isinstance(raw.get("boundary"), dict) else None

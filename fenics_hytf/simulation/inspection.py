@@ -110,6 +110,10 @@ def _notes(scene: Scene, lines: tuple[int, ...]) -> tuple[str, ...]:
     notes = []
     if not any(lines):
         notes.append("no line is excited: the motion is zero up to solver.max_frequency")
+    if scene.solver.sweep == "reduced":
+        notes.append(
+            "the reduced sweep takes the factorisations it needs: their number is from experience"
+        )
     if scene.effects.convection and len(lines) == 1:
         notes.append("convection acts between lapses; the scene has one")
     if scene.effects.convection:

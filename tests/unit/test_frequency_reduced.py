@@ -124,6 +124,23 @@ def test_one_line_is_one_factorisation():
     assert not still.solution(0).any()
 
 
+class Still:
+    """Loads of each line that are nought."""
+
+    def __len__(self) -> int:
+        return 1
+
+    def __call__(self, line):
+        return [vector(np.zeros(30))]
+
+
+@pytest.mark.parametrize("lines", [[], [3j, 4j]])
+def test_loads_of_nought_that_are_told_line_by_line(lines):
+    found = reduced_sweep(damped(springs(5, 6)), Still(), lines, TOLERANCE)
+    assert found.coordinates.shape[1:] == (1, len(lines))
+    assert not any(found.solution(k).any() for k in range(len(lines)))
+
+
 def test_expansions_of_a_like_system_are_kept():
     parts = springs(20, 20, seed=8)
     b = vector(np.random.default_rng(8).normal(size=400))

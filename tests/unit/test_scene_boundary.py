@@ -172,6 +172,12 @@ def test_an_absorbing_layer_along_level_ground():
     assert list(found) == ["effects.calm.thickness"]
 
 
+def test_a_law_that_is_no_name():
+    assert list(faults(changed(solver={"complex_modulus": ["shake91"]}))) == [
+        "solver.complex_modulus"
+    ]
+
+
 def test_shake91_without_stiffness():
     soil = {"clay": SOIL | {"damping": 0.8}, "sand": SOIL}
     solver = {"complex_modulus": "shake91"}
