@@ -61,7 +61,12 @@ PlotOption = Annotated[
 ]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="Not in this version.")]
 GroupOption = Annotated[
-    int | None, typer.Option("--group-size", metavar="K", help="Not in this version.")
+    int | None,
+    typer.Option(
+        "--group-size",
+        metavar="K",
+        help="Ranks that share a mesh; groups of them share out the lines  [by memory]",
+    ),
 ]
 
 
@@ -138,10 +143,10 @@ def run(
     group_size: GroupOption = None,
 ) -> None:
     """Run a scene; under mpirun on all ranks."""
-    _refuse_later(resume, group_size)
+    _refuse_later(resume)
     folder = output if output is not None else default_folder(scene)
-    request = RunRequest(scene, folder, motion, tuple(overrides or ()), force, quiet, not no_plots)
-    _leave("run", request)
+    settings = (motion, tuple(overrides or ()), force, quiet, not no_plots, group_size)
+    _leave("run", RunRequest(scene, folder, *settings))
 
 
 @app.command()
@@ -221,7 +226,7 @@ def demo(
     if name is None:
         typer.echo(list_demos())
         return
-    _refuse_later(resume, group_size)
+    _refuse_later(resume)
     try:
         source = find_demo(name)
     except InputError as error:
@@ -229,15 +234,35 @@ def demo(
         raise typer.Exit(INPUT) from None
     scene = Path(source.name)
     folder = output if output is not None else default_folder(scene)
-    settings = (motion, tuple(overrides or ()), force, quiet, not no_plots)
+    settings = (motion, tuple(overrides or ()), force, quiet, not no_plots, group_size)
     _leave("run", RunRequest(scene, folder, *settings, demo=source))
 
 
 @app.command()
-def accuracy(scene: SceneArgument) -> None:
-    """Cost against accuracy of a scene. Not in this version."""
-    tell([not_in_this_version("accuracy")])
-    raise typer.Exit(INPUT)
+def accuracy(
+    scene: SceneArgument,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder  [./<scene>-accuracy]"),
+    ] = None,
+    motion: MotionOption = None,
+    overrides: SetOption = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Start anew; otherwise finished runs are kept.")
+    ] = False,
+    budget: Annotated[
+        float | None,
+        typer.Option(metavar="SECONDS", help="Start no run after that; run again to go on."),
+    ] = None,
+    quiet: QuietOption = False,
+) -> None:
+    """What accuracy costs: error against cost of a scene over its settings."""
+    if _is_launched():
+        tell(["accuracy: found mpirun; expected to be run without: it starts its runs itself"])
+        raise typer.Exit(INPUT)
+    folder = output if output is not None else Path(f"{scene.stem}-accuracy")
+    request = RunRequest(scene, folder, motion, tuple(overrides or ()), force, quiet)
+    _leave("accuracy", request, budget=budget)
 
 
 def default_folder(scene: Path) -> Path:
@@ -245,11 +270,14 @@ def default_folder(scene: Path) -> Path:
     return Path(f"{scene.stem}-result")
 
 
-def _refuse_later(resume: bool, group_size: int | None) -> None:
-    asked = (("--resume", resume), ("--group-size", group_size is not None))
-    faults = [not_in_this_version(name) for name, is_asked in asked if is_asked]
-    if faults:
-        tell(faults)
+def _is_launched() -> bool:
+    """Whether mpirun has started this process, be it on one rank."""
+    return any(re.fullmatch(r"(OMPI_COMM_WORLD|PMIX|PMI)_RANK", name) for name in os.environ)
+
+
+def _refuse_later(resume: bool) -> None:
+    if resume:
+        tell([not_in_this_version("--resume")])
         raise typer.Exit(INPUT)
 
 
@@ -261,7 +289,11 @@ def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
     if faults:
         tell(faults)
         raise typer.Exit(INPUT)
-    from fenics_hytf.cli import check, run
+    from fenics_hytf.cli import accuracy, check, run
 
-    commands: dict[str, Any] = {"run": run.run_scene, "check": check.check_scene}
+    commands: dict[str, Any] = {
+        "run": run.run_scene,
+        "check": check.check_scene,
+        "accuracy": accuracy.study_accuracy,
+    }
     raise typer.Exit(run.guarded(partial(commands[command], **options), request))

@@ -29,6 +29,7 @@ class RunRequest:
         force: Whether a finished result may be replaced.
         quiet: No progress, no summary.
         plots: Whether figures and the report are made.
+        group_size: Ranks that share a mesh; from memory if ``None``.
         demo: Where the scene is copied from, or ``None``.
     """
 
@@ -39,6 +40,7 @@ class RunRequest:
     force: bool = False
     quiet: bool = False
     plots: bool = True
+    group_size: int | None = None
     demo: Path | None = None
 
 

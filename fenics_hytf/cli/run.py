@@ -30,7 +30,14 @@ from fenics_hytf.cli.outcome import (
 from fenics_hytf.cli.progress import show_progress
 from fenics_hytf.results import ResultFolder, folder_faults, open_result, publish
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation import Result, SimulationError, Snapshot, mesh_faults, simulate
+from fenics_hytf.simulation import (
+    Result,
+    SimulationError,
+    Snapshot,
+    group_faults,
+    mesh_faults,
+    simulate,
+)
 
 Command = Callable[[RunRequest, MPI.Comm], int]
 
@@ -110,6 +117,7 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
         copies, faults, scene_hash = plan
         force = request.force or is_same_demo(request.folder, scene_hash)
     faults += comm.bcast(at_root(comm, lambda: folder_faults(request.folder, force)))
+    faults += group_faults(request.group_size, comm.size)
     if faults and scene is not None:
         faults += [str(fault) for fault in mesh_faults(scene, comm)[1]]
     if faults:
@@ -130,7 +138,7 @@ def _simulate(
 
     with show_progress(quiet=request.quiet or comm.rank != 0) as progress:
         try:
-            return simulate(scene, comm, progress=progress, snapshot=snapshot)
+            return simulate(scene, comm, progress, snapshot, group_size=request.group_size)
         except SimulationError as error:
             partial = error.partial
             if partial is not None:

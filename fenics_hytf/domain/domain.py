@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -42,6 +42,8 @@ class Domain:
         region_names: Names of the regions, which are names of soils.
         regions: Region of each local cell, ghosts included, shape ``(num_local_cells,)``.
         boundaries: Local exterior facets by the name of the boundary.
+        across: Communicator of the ranks that hold the same part of the mesh, one of each group of
+            ranks that shares one.
     """
 
     mesh: Mesh
@@ -49,6 +51,7 @@ class Domain:
     region_names: tuple[str, ...]
     regions: npt.NDArray[np.int32]
     boundaries: dict[str, npt.NDArray[np.int32]]
+    across: MPI.Comm = field(default_factory=lambda: MPI.COMM_SELF)
 
     @property
     def comm(self) -> MPI.Comm:

@@ -9,15 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.frequency.errors import FactorisationError, ResidualError, ResonanceError
+from fenics_hytf.frequency.groups import share, together
 from fenics_hytf.frequency.loads import Loads
 from fenics_hytf.frequency.sweep import DenseSweep
 from fenics_hytf.frequency.system import DynamicSystem
+
+ComplexArray = npt.NDArray[np.complex128]
 
 _PREFIX = "hytf_direct_"
 
@@ -203,6 +208,7 @@ def direct_sweep(
     s: npt.ArrayLike,
     tolerance: float = 1e-6,
     progress: Callable[[int, int], None] | None = None,
+    across: MPI.Comm = MPI.COMM_SELF,
 ) -> DenseSweep:
     """Solve A(s) x = b at every frequency by factorisation.
 
@@ -212,6 +218,8 @@ def direct_sweep(
         s: Complex frequencies η + iω [rad/s], shape ``(num_lines,)``.
         tolerance: Relative residual that every solve must reach [-].
         progress: Called with the lines done and their number.
+        across: Communicator of the ranks that hold the same part of the system and share out the
+            lines; each has the solutions of all of them in the end.
 
     Returns:
         The solutions, residuals and counts.
@@ -226,21 +234,34 @@ def direct_sweep(
     num_local = system.mass.getLocalSize()[0]
     # One unknown a row of memory: each solution is a column, contiguous for PETSc.
     values = np.empty((num_local, len(lines) * len(sides)), np.complex128, order="F")
-    residuals = np.empty((len(lines), len(sides)))
+    residuals = np.zeros((len(lines), len(sides)))
     column = PETSc.Vec().createWithArray(
         np.empty(num_local, np.complex128), size=system.mass.getSizes()[0], comm=system.comm
     )
+    mine = range(*share(len(lines), across).indices(len(lines)))
     try:
-        with SymmetricFactorisation(system) as factorisation:
-            for line, frequency in enumerate(lines):
-                factorisation.factorise(complex(frequency))
+        with together(across), SymmetricFactorisation(system) as factorisation:
+            for done, line in enumerate(mine, start=1):
+                factorisation.factorise(complex(lines[line]))
                 for side, right in enumerate(sides(line) if callable(sides) else sides):
                     column.placeArray(values[:, line * len(sides) + side])
                     residuals[line, side] = factorisation.solve(right, column, tolerance)
                     column.resetArray()
                 if progress is not None:
-                    progress(line + 1, len(lines))
+                    progress(min(done * across.size, len(lines)), len(lines))
             count = factorisation.factorisations
     finally:
         column.destroy()
+    if across.size > 1:
+        count = across.allreduce(count)
+        across.Allreduce(MPI.IN_PLACE, residuals)
+        _spread(values, len(sides), len(lines), across)
     return DenseSweep(lines, values, residuals, count, residuals.size)
+
+
+def _spread(values: ComplexArray, num_sides: int, num_lines: int, across: MPI.Comm) -> None:
+    """Give every group the solutions of all, a line at a time: counts of MPI are 32 bits wide."""
+    bounds = [num_lines * group // across.size for group in range(across.size + 1)]
+    for owner, (first, stop) in enumerate(pairwise(bounds)):
+        for line in range(first, stop):
+            across.Bcast(values[:, line * num_sides : (line + 1) * num_sides], owner)

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,16 @@ class SweepError(RuntimeError):
     def __init__(self, s: complex, message: str) -> None:
         self.s = s
         super().__init__(f"at {s.imag / (2 * math.pi):.6g} Hz (s = {s:.6g} rad/s): {message}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle by the message, which ranks pass to each other, and not by the arguments."""
+        return _revive, (type(self), self.args, self.__dict__)
+
+
+def _revive(kind: type[SweepError], args: tuple[str], state: dict[str, Any]) -> SweepError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(state)
+    return error
 
 
 class FactorisationError(SweepError):

@@ -17,80 +17,15 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
-from petsc4py import PETSc
-from scipy import sparse
 
-from fenics_hytf.frequency.loads import inner
-from fenics_hytf.frequency.system import DynamicSystem, ScalarFunction
+from fenics_hytf.frequency.products import TermProducts, inner, norm
+from fenics_hytf.frequency.system import ScalarFunction
 
 ComplexArray = npt.NDArray[np.complex128]
 
 _CIRCLE = 0.3  # radius of the circle round an expansion point, over its distance from the real axis
 _NODES = 16  # on the circle: a function that is regular within three times it is exact to 1e-8
 _NOTHING = 1e-12  # of the largest coefficient
-
-
-class TermProducts:
-    """K_j X of each term of a system, for blocks X of this rank's rows.
-
-    Args:
-        system: The system.
-    """
-
-    def __init__(self, system: DynamicSystem) -> None:
-        self.functions = [function for _, function in system.terms]
-        self.comm: MPI.Comm = system.comm.tompi4py()
-        self._matrices = [matrix for matrix, _ in system.terms]
-        self._local = [real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
-
-    def __len__(self) -> int:
-        return len(self.functions)
-
-    def __call__(self, term: int, X: ComplexArray) -> ComplexArray:
-        """K_j X.
-
-        Args:
-            term: j.
-            X: Shape ``(num_local, n)``.
-
-        Returns:
-            Shape ``(num_local, n)``.
-        """
-        if self._local:
-            return times(self._local[term], X)
-        matrix = self._matrices[term]
-        block = PETSc.Mat().createDense(
-            ((X.shape[0], None), (None, X.shape[1])),
-            array=np.asfortranarray(X),
-            comm=matrix.comm,
-        )
-        product = matrix.matMult(block)
-        result = product.getDenseArray().copy()
-        product.destroy()
-        block.destroy()
-        return np.asarray(result, np.complex128)
-
-
-def real_rows(matrix: PETSc.Mat) -> sparse.csr_matrix:
-    """A serial real matrix without the zeros that only the common pattern holds."""
-    start, columns, values = matrix.getValuesCSR()
-    rows = sparse.csr_matrix((values.real.copy(), columns, start), shape=matrix.getSize())
-    rows.eliminate_zeros()
-    return rows
-
-
-def times(matrix: sparse.csr_matrix, block: ComplexArray) -> ComplexArray:
-    """A real sparse matrix times a complex block.
-
-    Args:
-        matrix: Shape ``(m, n)``.
-        block: Shape ``(n, k)``.
-
-    Returns:
-        Shape ``(m, k)``.
-    """
-    pairs = np.ascontiguousarray(block).view(np.float64)
-    return np.ascontiguousarray(matrix @ pairs).view(np.complex128)
 
 
 def taylor(function: ScalarFunction, s: complex, order: int, radius: float) -> ComplexArray:
@@ -136,7 +71,7 @@ def krylov_block(
     steps = size if radius > 0 else 1
     coefficients = [taylor(f, s, order, radius) for f in products.functions] if radius else []
     comm = products.comm
-    length = _norm(comm, first)
+    length = norm(comm, first)
     Q = np.empty((len(first), steps), np.complex128)
     if length == 0.0:
         return Q[:, :0]
@@ -148,13 +83,11 @@ def krylov_block(
         pull = np.zeros(len(first), np.complex128)
         for back in range(order):
             x = Q[:, :k] @ states[k - 1, back, :k]
-            factors = np.array([c[back + 1] for c in coefficients])
-            for term in np.flatnonzero(abs(factors) > 0):
-                pull -= factors[term] * products(int(term), x[:, None])[:, 0]
+            pull -= products.weighted([c[back + 1] for c in coefficients], x)
         w = solve(pull)
         overlap, rest = _against(comm, Q[:, :k], w)
-        length = _norm(comm, rest)
-        if length <= _NOTHING * _norm(comm, w):
+        length = norm(comm, rest)
+        if length <= _NOTHING * norm(comm, w):
             return Q[:, :k]
         Q[:, k] = rest / length
         state = np.zeros((order, steps), np.complex128)
@@ -174,7 +107,3 @@ def _against(comm: MPI.Comm, Q: ComplexArray, w: ComplexArray) -> tuple[ComplexA
     rest = w - Q @ overlap
     again = inner(comm, Q, rest)
     return overlap + again, rest - Q @ again
-
-
-def _norm(comm: MPI.Comm, x: ComplexArray) -> float:
-    return float(np.sqrt(comm.allreduce(float(np.vdot(x, x).real))))

@@ -16,6 +16,8 @@ import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fenics_hytf.frequency.products import inner, norm
+
 ComplexArray = npt.NDArray[np.complex128]
 
 
@@ -99,7 +101,7 @@ def _gathered(
                 overlap = inner(comm, W, rest)
                 rest -= W @ overlap
                 c += overlap
-            left = float(np.sqrt(comm.allreduce(float(np.vdot(rest, rest).real))))
+            left = norm(comm, rest)
             if left > tolerance * norms[line, side]:
                 W = np.column_stack([W, rest / left])
                 c = np.append(c, left)
@@ -111,18 +113,3 @@ def _gathered(
         for side, c in enumerate(sides):
             coordinates[: len(c), side, line] = c
     return LoadFactors(W, coordinates, norms)
-
-
-def inner(comm: MPI.Comm, left: ComplexArray, right: ComplexArray) -> ComplexArray:
-    """Inner products leftᴴ right over all ranks, without a copy of the left block.
-
-    Args:
-        comm: Communicator.
-        left: Shape ``(num_local, n)``.
-        right: Shape ``(num_local,)`` or ``(num_local, m)``.
-
-    Returns:
-        Shape ``(n,)`` or ``(n, m)``.
-    """
-    product = np.conj(left.T @ np.conj(right))
-    return product if comm.size == 1 else np.asarray(comm.allreduce(product))

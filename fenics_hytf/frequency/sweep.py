@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -10,6 +11,11 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 ComplexArray = npt.NDArray[np.complex128]
+
+
+# From a matrix with as many columns as unknowns to this rank's rows of its product with the
+# response, shape (num_local_rows, num_lines).
+Response = Callable[[PETSc.Mat], ComplexArray]
 
 
 class Sweep(Protocol):
@@ -42,6 +48,17 @@ class Sweep(Protocol):
 
         Returns:
             This rank's rows, shape ``(num_local_rows, num_sides, num_lines)``.
+        """
+
+    def response(self, weights: ComplexArray) -> Response:
+        """Weigh all right-hand sides together.
+
+        Args:
+            weights: Of each right-hand side at each line, shape ``(num_sides, num_lines)``.
+
+        Returns:
+            What multiplies the response by matrices; in single precision where the tolerance of
+            the sweep lets nothing finer through.
         """
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
@@ -100,6 +117,10 @@ class DenseSweep:
         product.destroy()
         everything.destroy()
         return result
+
+    def response(self, weights: ComplexArray) -> Response:
+        """Weigh all right-hand sides together; see :class:`Sweep`."""
+        return lambda rows: np.einsum("rsk,sk->rk", self.project(rows), weights)
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""

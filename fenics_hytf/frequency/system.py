@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -29,7 +30,7 @@ def constant(s: complex) -> complex:
 
 def hysteretic(s: complex) -> complex:
     """i·sign(ω), of the imaginary part of a hysteretic stiffness; 0 on the real axis."""
-    return 1j * float(np.sign(s.imag))
+    return 1j * np.sign(s.imag)
 
 
 def radiation(factor: complex) -> ScalarFunction:
@@ -53,6 +54,25 @@ def radiation(factor: complex) -> ScalarFunction:
         return s * (root if s.imag > 0 else root.conjugate())
 
     return function
+
+
+def values(function: ScalarFunction, s: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    """A function of s at all lines: at once where it takes arrays, else one by one.
+
+    Args:
+        function: The function.
+        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+
+    Returns:
+        Shape ``(num_lines,)``.
+    """
+    try:
+        found = np.broadcast_to(np.asarray(function(s), np.complex128), s.shape)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        found = None
+    if found is None or (len(s) and found[-1] != function(complex(s[-1]))):
+        return np.array([function(complex(z)) for z in s], np.complex128)
+    return found
 
 
 class DynamicSystem:

@@ -15,6 +15,7 @@ from fenics_hytf.lapse.ground import (
     seed_points,
     survey,
 )
+from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
 from fenics_hytf.lapse.response import (
     CellPeaks,
@@ -24,7 +25,6 @@ from fenics_hytf.lapse.response import (
     ReceiverProbe,
 )
 from fenics_hytf.lapse.run import Observer, Solved, excite, solve
-from fenics_hytf.lapse.strain import shear_strain
 
 __all__ = [
     "Anderson",
@@ -56,8 +56,9 @@ __all__ = [
     "first_strain",
     "iterate",
     "outcrop_motion",
+    "peak_length",
+    "peak_shear_strain",
     "seed_points",
-    "shear_strain",
     "solve",
     "survey",
     "within_motion",

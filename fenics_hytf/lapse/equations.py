@@ -21,6 +21,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 from dolfinx.fem import Function
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain, constraint_matrix
@@ -107,6 +108,11 @@ class Equations:
         self._influence: list[PETSc.Vec] = []
         self._inertia: list[PETSc.Vec] = []
         self._loaded: list[PETSc.Vec] = []
+
+    @property
+    def across(self) -> MPI.Comm:
+        """Communicator of the ranks that hold the same part of the equations."""
+        return self._domain.across
 
     @property
     def gdim(self) -> int:

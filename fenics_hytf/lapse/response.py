@@ -8,6 +8,7 @@ not solved counts as zero in the response and in the base acceleration that is a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import Sweep
-from fenics_hytf.lapse.strain import shear_strain
+from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.motion import to_time
 from fenics_hytf.operators import constrained_rows, displacement_rows, strain_rows
 from fenics_hytf.particles import (
@@ -29,7 +30,7 @@ from fenics_hytf.particles import (
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-_BLOCK = 256  # cells whose histories are held at once
+_BLOCK = 64  # cells whose histories are held at once: they stay in the cache
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,12 @@ class Excitation:
         """Complex frequency iω of the lines [rad/s]."""
         return np.asarray(1j * self.omega, np.complex128)
 
+    @cached_property
+    def _places(self) -> slice | npt.NDArray[np.intp]:
+        """The lines among all: as a slice where they are neighbours, which is copied faster."""
+        first, last = self.lines[[0, -1]] if len(self.lines) else (0, -1)
+        return slice(first, last + 1) if last + 1 - first == len(self.lines) else self.lines
+
     def to_time(self, coefficients: ComplexArray) -> RealArray:
         """Sum the lines at every sample.
 
@@ -75,10 +82,11 @@ class Excitation:
             coefficients: Shape ``(..., num_lines)``.
 
         Returns:
-            Shape ``(..., num_samples)``.
+            Shape ``(..., num_samples)``, of the same precision.
         """
-        spectrum = np.zeros((*coefficients.shape[:-1], self.num_samples // 2 + 1), complex)
-        spectrum[..., self.lines] = coefficients
+        shape = (*coefficients.shape[:-1], self.num_samples // 2 + 1)
+        spectrum = np.zeros(shape, coefficients.dtype)
+        spectrum[..., self._places] = coefficients
         return to_time(spectrum, self.num_samples)
 
     def respond(self, projected: ComplexArray) -> ComplexArray:
@@ -199,12 +207,14 @@ class CellPeaks:
 
 
 class CellProbe:
-    """Evaluates the response at the centres of cells.
+    """Evaluates the response at the centres of cells, a block of them at a time.
 
     Args:
         domain: The domain.
         T: Constraint matrix.
-        convention: Strain measure, see :func:`shear_strain`.
+        convention: Strain measure, see :func:`peak_shear_strain`.
+
+    Groups of ranks with the same cells share out the blocks.
     """
 
     def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
@@ -212,7 +222,7 @@ class CellProbe:
         owned = domain.num_owned_cells
         blocks = domain.comm.allreduce(-(-owned // _BLOCK), MPI.MAX)
         self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
-        for block in range(blocks):
+        for block in range(domain.across.rank, blocks, domain.across.size):
             first, stop = min(block * _BLOCK, owned), min((block + 1) * _BLOCK, owned)
             centres = cell_centres(domain.mesh, first, stop)
             count = domain.num_components
@@ -227,13 +237,6 @@ class CellProbe:
             for row in rows:
                 row.destroy()
 
-    def _strain(self, rows: PETSc.Mat, sweep: Sweep, excitation: Excitation) -> ComplexArray:
-        """Strain spectra of a block, shape ``(num_cells, num_strains, num_lines)``."""
-        spectra = excitation.respond(sweep.project(rows))
-        gdim = self._domain.gdim
-        num_strains = gdim if self._domain.num_components == 1 else gdim * (gdim + 1) // 2
-        return spectra.reshape(len(spectra) // num_strains, num_strains, spectra.shape[-1])
-
     def peak_strain(self, sweep: Sweep, excitation: Excitation) -> RealArray:
         """Largest shear strain of every cell (collective).
 
@@ -244,11 +247,12 @@ class CellProbe:
         Returns:
             All cells in the order of the input [-], shape ``(num_cells,)``.
         """
-        peak = np.empty(self._domain.num_owned_cells)
+        peak = np.zeros((self._domain.num_owned_cells, 1))
+        response = sweep.response(excitation.weights)
         for cells, strain, _ in self._blocks:
-            history = excitation.to_time(self._strain(strain, sweep, excitation))
-            peak[cells] = shear_strain(history, self._convention).max(axis=1, initial=0.0)
-        return self._domain.gather_cells(peak)
+            spectra = _by_cell(response(strain), cells)
+            peak[cells, 0] = peak_shear_strain(excitation.to_time(spectra), self._convention)
+        return self._gather(peak)[:, 0]
 
     def peaks(
         self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray, base: ComplexArray
@@ -267,29 +271,43 @@ class CellProbe:
         """
         domain = self._domain
         mine = modulus[domain.input_cells[: domain.num_owned_cells]]
-        peak = np.empty((domain.num_owned_cells, 5))
+        peak = np.zeros((domain.num_owned_cells, 5))
         at_rest = excitation.omega == 0
         still = excitation.respond(base)
+        response = sweep.response(excitation.weights)
         for cells, strain, place in self._blocks:
-            spectra = self._strain(strain, sweep, excitation)
+            spectra = _by_cell(response(strain), cells)
             # G* is real at ω = 0.
             factor = np.where(at_rest, mine[cells, None].real, mine[cells, None])[:, None, :]
-            for column, values in ((0, spectra), (1, factor * spectra)):
-                history = shear_strain(excitation.to_time(values), self._convention)
-                peak[cells, column] = history.max(axis=1, initial=0.0)
-            u = excitation.respond(sweep.project(place))
-            u = u.reshape(cells.stop - cells.start, *still.shape)
-            for column, values in enumerate(_motions(u, u - still, excitation), start=2):
-                distance = np.linalg.norm(excitation.to_time(values), axis=1)
-                peak[cells, column] = distance.max(axis=1, initial=0.0)
-        return CellPeaks(*domain.gather_cells(peak).T)
+            for column, values in enumerate((spectra, factor.astype(spectra.dtype) * spectra)):
+                history = excitation.to_time(values)
+                peak[cells, column] = peak_shear_strain(history, self._convention)
+            u = _by_cell(response(place), cells)
+            for column, values in enumerate(_motions(u, still, excitation), start=2):
+                peak[cells, column] = peak_length(excitation.to_time(values))
+        return CellPeaks(*self._gather(peak).T)
+
+    def _gather(self, peak: RealArray) -> RealArray:
+        """All cells in the order of the input, from the ranks that looked at them."""
+        if self._domain.across.size > 1:
+            self._domain.across.Allreduce(MPI.IN_PLACE, peak, MPI.MAX)
+        return self._domain.gather_cells(peak)
+
+
+def _by_cell(spectra: ComplexArray, cells: slice) -> ComplexArray:
+    """Rows of a block, shape ``(num_cells, num_values, num_lines)``."""
+    count = cells.stop - cells.start
+    values = len(spectra) // count if count else 1
+    return spectra.reshape(count, values, spectra.shape[-1])
 
 
 def _motions(
-    u: ComplexArray, relative: ComplexArray, excitation: Excitation
+    u: ComplexArray, still: ComplexArray, excitation: Excitation
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Spectra of total acceleration, relative velocity and relative displacement."""
-    total = -(excitation.omega**2) * u
+    given = np.zeros_like(still)
     for motion, axis in enumerate(excitation.axes):
-        total[:, axis] += excitation.weights[motion]
-    return total, 1j * excitation.omega * relative, relative
+        given[axis] += excitation.weights[motion]
+    s = excitation.s.astype(u.dtype)
+    relative = u - still.astype(u.dtype)
+    return s * s * u + given.astype(u.dtype), s * relative, relative

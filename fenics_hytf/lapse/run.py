@@ -195,13 +195,14 @@ class _Sweeps:
             lapse = self._equations.assemble(self._ground, *parts)
         with self._observer.phase("sweep"):
             arguments = lapse.system, lapse.loads, excitation.s
+            across = self._equations.across
 
             def report(done: int, total: int) -> None:
                 self._observer.sweeping(iteration, done, total)
 
             sweep: Sweep
             if solver.sweep == "direct":
-                sweep = direct_sweep(*arguments, solver.tolerance, report)
+                sweep = direct_sweep(*arguments, solver.tolerance, report, across)
             else:
                 self.tolerance = solver.tolerance if tolerance is None else tolerance
                 reduced = reduced_sweep(
@@ -210,6 +211,7 @@ class _Sweeps:
                     report,
                     self._expansions,
                     block=_BLOCK[self._equations.gdim],
+                    across=across,
                 )
                 self._expansions, sweep = reduced.expansions, reduced
         self.last, self.constants = sweep, parts[0]

@@ -48,12 +48,13 @@ def to_time(coefficients: npt.ArrayLike, num_samples: int) -> RealArray:
         num_samples: Samples in time; odd and even numbers share a number of lines.
 
     Returns:
-        Real samples, shape ``(..., num_samples)``.
+        Real samples, shape ``(..., num_samples)``, in single precision if the coefficients are.
 
     Raises:
         ValueError: If the numbers of lines and samples do not belong together.
     """
-    values = np.asarray(coefficients, dtype=np.complex128)
+    values = np.asarray(coefficients)
+    values = values.astype(np.result_type(values, np.complex64), copy=False)
     if values.shape[-1] != num_samples // 2 + 1:
         raise ValueError(
             f"coefficients: found {values.shape[-1]} lines for {num_samples} samples; expected "

@@ -94,5 +94,8 @@ def constrained_rows(domain: Domain, local: sparse.csr_matrix, T: PETSc.Mat) -> 
     )
     rows.assemble()
     product = rows.matMult(T)
+    # The product keeps what computing it again would take, a dense row of all unknowns.
+    result = product.duplicate(copy=True)
     rows.destroy()
-    return product
+    product.destroy()
+    return result

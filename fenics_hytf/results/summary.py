@@ -59,6 +59,7 @@ def summarise(result: Result) -> dict[str, Any]:
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "versions": versions(),
         "ranks": result.num_ranks,
+        "group_size": result.group_size,
         "scene_hash": result.scene.hash,
         "scene": describe_scene(result.scene),
         "effects": list(result.scene.effects.named),

@@ -4,6 +4,7 @@
 from fenics_hytf.simulation.check import mesh_faults
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.flow import simulate
+from fenics_hytf.simulation.groups import group_faults
 from fenics_hytf.simulation.inspection import Inspection, inspect
 from fenics_hytf.simulation.records import (
     Progress,
@@ -23,6 +24,7 @@ __all__ = [
     "Snapshot",
     "SnapshotCallback",
     "Work",
+    "group_faults",
     "inspect",
     "mesh_faults",
     "simulate",

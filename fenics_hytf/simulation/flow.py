@@ -40,6 +40,7 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.errors import SimulationError
+from fenics_hytf.simulation.groups import Groups, form_groups, require_same_parts
 from fenics_hytf.simulation.receivers import Receivers
 from fenics_hytf.simulation.records import (
     Progress,
@@ -63,26 +64,30 @@ def simulate(
     progress: ProgressCallback | None = None,
     snapshot: SnapshotCallback | None = None,
     strain_from: npt.NDArray[np.intp] | None = None,
+    group_size: int | None = None,
 ) -> Result:
     """Run a scene: what ``hytf run`` does, without files (collective).
 
     Args:
         scene: The scene.
-        comm: Communicator; the mesh is distributed over its ranks.
+        comm: Communicator; its ranks share out the lines, and the mesh where memory asks for it.
         progress: Called on rank 0 while the simulation runs.
         snapshot: Called on every rank after every ``output.every``-th lapse, with points and
             fields on rank 0.
         strain_from: For every cell of the input the cell whose strain rules its moduli in the
             equivalent-linear loop, shape ``(num_cells,)``; each cell's own if ``None``.
+        group_size: Ranks that share a mesh, a divisor of their number; from memory if ``None``.
 
     Returns:
         The result, the same on every rank.
 
     Raises:
         SceneError: A fault that only the mesh shows.
+        ValueError: The group size does not divide the number of ranks.
         SimulationError: The numerics stopped; it holds the lapses that were solved.
     """
-    run = _Run(scene, comm, progress, strain_from)
+    groups = form_groups(scene, comm, group_size)
+    run = _Run(scene, comm, groups, progress, strain_from)
     index = 0
     try:
         run.set_up()
@@ -94,12 +99,14 @@ def simulate(
             run.convect(solved)
             if snapshot is not None and (index + 1) % scene.output.every == 0:
                 run.show(solved, index, segment.stop, snapshot)
-        return run.result()
+        result = run.result()
     except (SweepError, LapseError, PointsOutside, PointsNotFinite) as error:
         partial = run.result() if run.lapses else None
         raise SimulationError(index, str(error), partial) from error
     finally:
         run.destroy()
+    groups.free()
+    return result
 
 
 class _Run:
@@ -109,11 +116,12 @@ class _Run:
         self,
         scene: Scene,
         comm: MPI.Comm,
+        groups: Groups,
         progress: ProgressCallback | None,
         strain_from: npt.NDArray[np.intp] | None,
     ) -> None:
         self.scene = scene
-        self.comm = comm
+        self.comm, self._groups = comm, groups
         self.clock = Clock()
         self.lapses: list[LapseResult] = []
         self._work = Work(wall_s=self.clock.wall_s)
@@ -128,7 +136,9 @@ class _Run:
         """Mesh, points, receivers, and the operators that last for the whole run."""
         scene = self.scene
         with self.clock.phase("setup"):
-            self.domain = checked_domain(scene, self.comm)
+            domain = checked_domain(scene, self._groups.within)
+            self.domain = replace(domain, across=self._groups.across)
+            require_same_parts(self.domain)
             self.points = seed_points(scene, self.domain)
             self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
             self.free_fields = self._level_ground()
@@ -140,7 +150,7 @@ class _Run:
             )
             self._base = BaseProbe(self.domain, self.equations)
             self._owned += [self._probe, self._base]
-        self._ledger = self.points.ledger(self.comm)
+        self._ledger = self.points.ledger(self.domain.comm)
 
     def _level_ground(self) -> list[FreeField]:
         """A column beyond each side with free field."""
@@ -325,12 +335,12 @@ class _Run:
 
     def result(self) -> Result:
         """Everything so far."""
-        comm = self.domain.comm
         self._work.assemblies = dict(self._assemblies)
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         return Result(
             scene=self.scene,
-            num_ranks=comm.size,
+            num_ranks=self.comm.size,
+            group_size=self.domain.comm.size,
             components=self.domain.components,
             directions=tuple(m.direction for m in self.scene.motion),
             receivers=self.receivers.names,
@@ -345,5 +355,5 @@ class _Run:
                 "points": self._ledger.num_points,
             },
             work=self._work,
-            peak_memory=comm.allreduce(memory, MPI.MAX),
+            peak_memory=self.comm.allreduce(memory, MPI.MAX),
         )

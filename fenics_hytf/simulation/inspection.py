@@ -36,7 +36,8 @@ class Inspection:
         lines: Lines solved in each lapse.
         factorisations: Factorisations expected, those of free-field columns among them; with the
             equivalent-linear loop the most there can be.
-        memory_bytes: Estimated memory of all ranks [bytes].
+        shared_bytes: Estimated memory of what ranks share that share a mesh [bytes].
+        ranks: Ranks that share the mesh.
         notes: What the user should know.
     """
 
@@ -48,8 +49,18 @@ class Inspection:
     samples_per_lapse: int
     lines: tuple[int, ...]
     factorisations: int
-    memory_bytes: int
+    shared_bytes: int
+    ranks: int
     notes: tuple[str, ...]
+
+    @property
+    def memory_bytes(self) -> int:
+        """Estimated memory of all ranks [bytes]."""
+        return self.memory_of(self.ranks)
+
+    def memory_of(self, ranks: int) -> int:
+        """Estimated memory of so many ranks that share the mesh [bytes]."""
+        return self.shared_bytes + int(ranks * _BASE)
 
 
 def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
@@ -92,18 +103,18 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         samples_per_lapse=scene.segments[0].num_samples,
         lines=lines,
         factorisations=sum(solved) * iterations * (1 + columns),
-        memory_bytes=_memory(unknowns, domain.gdim, held, comm.size)
-        + num_points * points.bytes_per_point,
+        shared_bytes=_memory(unknowns, domain.gdim, held) + num_points * points.bytes_per_point,
+        ranks=comm.size,
         notes=_notes(scene, lines),
     )
 
 
-def _memory(unknowns: int, gdim: int, columns: int, ranks: int) -> int:
+def _memory(unknowns: int, gdim: int, columns: int) -> int:
     log = max(unknowns, 2).bit_length()
     factor = _FACTOR_2D * unknowns * log if gdim == 2 else float(unknowns) ** (4 / 3)
     row = (9 if gdim == 2 else 27) * gdim * 2
     matrices = 8 * unknowns * row * (_ENTRY + 8)
-    return int(ranks * _BASE + 2 * factor * _ENTRY + matrices + unknowns * columns * _ENTRY)
+    return int(2 * factor * _ENTRY + matrices + unknowns * columns * _ENTRY)
 
 
 def _notes(scene: Scene, lines: tuple[int, ...]) -> tuple[str, ...]:

@@ -103,6 +103,7 @@ class Result:
     Attributes:
         scene: The scene that was run.
         num_ranks: MPI ranks.
+        group_size: Ranks that share a mesh; groups of them share out the lines.
         components: Names of the displacement components, ``("x", "y")`` or with ``"z"``.
         directions: Direction of each motion.
         receivers: Names.
@@ -118,6 +119,7 @@ class Result:
 
     scene: Scene
     num_ranks: int
+    group_size: int
     components: tuple[str, ...]
     directions: tuple[str, ...]
     receivers: tuple[str, ...]

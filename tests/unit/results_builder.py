@@ -76,6 +76,7 @@ def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", *
     return Result(
         scene=scene,
         num_ranks=1,
+        group_size=1,
         components=components,
         directions=tuple(directions),
         receivers=receivers,

@@ -61,7 +61,10 @@ def files(folder):
 
 
 def replace_simulate(monkeypatch, action):
-    monkeypatch.setattr(run, "simulate", lambda scene, comm, progress, snapshot: action(snapshot))
+    def simulate(scene, comm, progress, snapshot, group_size):
+        return action(snapshot)
+
+    monkeypatch.setattr(run, "simulate", simulate)
 
 
 def test_run_writes_a_finished_result(here, hytf):
@@ -114,7 +117,8 @@ def test_every_fault_is_told_at_once_and_nothing_written(here, hytf):
         (("s.toml", "--set", "output.receivers.top=[0.5, 9.0]"), "top"),
         (("s.toml", "--set", "nonsense"), "nonsense"),
         (("s.toml", "--resume"), "--resume: not in this version"),
-        (("s.toml", "--group-size", "2"), "--group-size: not in this version"),
+        (("s.toml", "--group-size", "2"), "group size: found 2, with 1 rank; expected one of 1"),
+        (("s.toml", "--group-size", "0"), "group size: found 0"),
         (("s.toml", "--set", 'lapses.continuity="transient"'), "not in this version"),
         (("s.toml", "--bogus"), "bogus"),
         ((), "SCENE"),
@@ -252,9 +256,6 @@ def test_plot_needs_a_finished_result(here, hytf, folder):
     assert (code, out) == (2, "") and "no summary.json" in err and "Traceback" not in err
     assert [p.name for p in here.iterdir()] == ["s.toml"]
 
-
-def test_accuracy_is_not_in_this_version(here, hytf):
-    assert hytf("accuracy", "s.toml") == (2, "", "hytf: accuracy: not in this version\n")
 
 
 def test_version(hytf):

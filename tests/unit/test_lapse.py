@@ -23,7 +23,8 @@ from fenics_hytf.lapse import (
     excite,
     first_strain,
     iterate,
-    shear_strain,
+    peak_length,
+    peak_shear_strain,
     survey,
 )
 from fenics_hytf.motion import to_time
@@ -270,8 +271,8 @@ def voigt(tensor) -> np.ndarray:
 )
 def test_strain_measures_in_plane_strain(strain, plane, spatial):
     values = np.array(strain)[None, :, None]
-    assert shear_strain(values, "plane")[0, 0] == pytest.approx(plane, abs=1e-19)
-    assert shear_strain(values, "3d")[0, 0] == pytest.approx(spatial, abs=1e-19)
+    assert peak_shear_strain(values, "plane")[0] == pytest.approx(plane, abs=1e-19)
+    assert peak_shear_strain(values, "3d")[0] == pytest.approx(spatial, abs=1e-19)
 
 
 def test_strain_measures_do_not_depend_on_the_axes():
@@ -280,7 +281,7 @@ def test_strain_measures_do_not_depend_on_the_axes():
     tensor += tensor.T
     principal = np.linalg.eigvalsh(tensor)
     for turn in Rotation.random(20, rng=rng).as_matrix():
-        found = shear_strain(voigt(turn @ tensor @ turn.T))[0, 0]
+        found = peak_shear_strain(voigt(turn @ tensor @ turn.T))[0]
         assert found == pytest.approx(principal[2] - principal[0], rel=1e-13)
     flat = tensor.copy()
     flat[2], flat[:, 2] = 0.0, 0.0
@@ -288,21 +289,37 @@ def test_strain_measures_do_not_depend_on_the_axes():
     for angle in np.linspace(0, np.pi, 13):
         c, s = np.cos(angle), np.sin(angle)
         turned = np.array([[c, -s], [s, c]]) @ flat[:2, :2] @ np.array([[c, s], [-s, c]])
-        assert shear_strain(voigt(turned), "3d")[0, 0] == pytest.approx(
+        assert peak_shear_strain(voigt(turned), "3d")[0] == pytest.approx(
             third[2] - third[0], rel=1e-13
         )
         # In three dimensions the same measure.
-        assert shear_strain(voigt(flat))[0, 0] == pytest.approx(third[2] - third[0], rel=1e-13)
+        assert peak_shear_strain(voigt(flat))[0] == pytest.approx(third[2] - third[0], rel=1e-13)
 
 
 def test_spatial_strains_by_their_components():
     for component in (3, 4, 5):  # engineering shear alone
         values = np.zeros((1, 6, 2))
         values[0, component] = [4e-4, -4e-4]
-        np.testing.assert_allclose(shear_strain(values), [[4e-4, 4e-4]], rtol=1e-14)
+        np.testing.assert_allclose(peak_shear_strain(values), [4e-4], rtol=1e-14)
     values = np.zeros((1, 6, 1))
     values[0, :3, 0] = [1e-4, -2e-4, 5e-4]
-    np.testing.assert_allclose(shear_strain(values), [[7e-4]], rtol=1e-14)
+    np.testing.assert_allclose(peak_shear_strain(values), [7e-4], rtol=1e-14)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_the_peak_is_that_of_the_worst_instant(kind):
+    rng = np.random.default_rng(8)
+    strain = rng.normal(size=(5, 6, 400)).astype(kind)
+    tensor = np.empty((5, 400, 3, 3))
+    for component, (i, j) in enumerate([(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]):
+        value = strain[:, component].astype(float) / (1 if i == j else 2)
+        tensor[:, :, i, j] = tensor[:, :, j, i] = value
+    principal = np.linalg.eigvalsh(tensor)
+    expected = (principal[:, :, 2] - principal[:, :, 0]).max(axis=1)
+    np.testing.assert_allclose(peak_shear_strain(strain), expected, rtol=1e-13)
+    length = np.linalg.norm(strain.astype(float), axis=1).max(axis=1)
+    np.testing.assert_allclose(peak_length(strain), length, rtol=1e-13)
+    assert not peak_shear_strain(strain[:, :, :0]).any() and not peak_length(strain[:, :, :0]).any()
 
 
 # ---------------------------------------------------------------- what is in a cell
@@ -544,6 +561,9 @@ class FieldSweep:
 
     def __init__(self, fields):
         self.fields = fields  # (num_local, num_sides, num_lines)
+
+    def response(self, weights):
+        return lambda rows: np.einsum("rsk,sk->rk", self.project(rows), weights)
 
     def project(self, rows):
         out = np.empty((rows.getLocalSize()[0], *self.fields.shape[1:]), complex)

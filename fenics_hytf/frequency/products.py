@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""Products of the system's real matrices with blocks of complex vectors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy import sparse
+
+from fenics_hytf.frequency.system import DynamicSystem
+
+ComplexArray = npt.NDArray[np.complex128]
+
+
+class TermProducts:
+    """K_j X of each term of a system, for blocks X of this rank's rows.
+
+    Args:
+        system: The system.
+    """
+
+    def __init__(self, system: DynamicSystem) -> None:
+        self.functions = [function for _, function in system.terms]
+        self.comm: MPI.Comm = system.comm.tompi4py()
+        self._matrices = [matrix for matrix, _ in system.terms]
+        self._local = [real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
+
+    def __len__(self) -> int:
+        return len(self.functions)
+
+    def __call__(self, term: int, X: ComplexArray) -> ComplexArray:
+        """K_j X.
+
+        Args:
+            term: j.
+            X: Shape ``(num_local, n)``.
+
+        Returns:
+            Shape ``(num_local, n)``.
+        """
+        if self._local:
+            return times(self._local[term], X)
+        return multiply(self._matrices[term], X)
+
+    def weighted(self, factors: Sequence[complex], x: ComplexArray) -> ComplexArray:
+        """Σ factor_j K_j x.
+
+        Args:
+            factors: Of each term.
+            x: Shape ``(num_local,)``.
+
+        Returns:
+            Shape ``(num_local,)``.
+        """
+        total = np.zeros_like(x)
+        for term in np.flatnonzero(factors):
+            total += factors[term] * self(int(term), x[:, None])[:, 0]
+        return total
+
+
+def multiply(matrix: PETSc.Mat, block: ComplexArray) -> ComplexArray:
+    """A PETSc matrix times a block of this rank's rows (collective).
+
+    Args:
+        matrix: The matrix.
+        block: Shape ``(num_local_columns, n)``.
+
+    Returns:
+        Shape ``(num_local_rows, n)``.
+    """
+    dense = PETSc.Mat().createDense(
+        ((block.shape[0], None), (None, block.shape[1])),
+        array=np.asfortranarray(block),
+        comm=matrix.comm,
+    )
+    product = matrix.matMult(dense)
+    result = product.getDenseArray().copy()
+    product.destroy()
+    dense.destroy()
+    return np.asarray(result, np.complex128)
+
+
+def real_rows(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """A serial real matrix without the zeros that only the common pattern holds."""
+    start, columns, values = matrix.getValuesCSR()
+    rows = sparse.csr_matrix((values.real.copy(), columns, start), shape=matrix.getSize())
+    rows.eliminate_zeros()
+    return rows
+
+
+def times(matrix: sparse.csr_matrix | sparse.csc_matrix, block: ComplexArray) -> ComplexArray:
+    """A real sparse matrix times a complex block.
+
+    Args:
+        matrix: Shape ``(m, n)``.
+        block: Shape ``(n, k)``.
+
+    Returns:
+        Shape ``(m, k)``.
+    """
+    pairs = np.ascontiguousarray(block).view(np.float64)
+    return np.ascontiguousarray(matrix @ pairs).view(np.complex128)
+
+
+def inner(comm: MPI.Comm, left: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Inner products leftᴴ right over all ranks, without a copy of the left block.
+
+    Args:
+        comm: Communicator.
+        left: Shape ``(num_local, n)``.
+        right: Shape ``(num_local,)`` or ``(num_local, m)``.
+
+    Returns:
+        Shape ``(n,)`` or ``(n, m)``.
+    """
+    product = np.conj(left.T @ np.conj(right))
+    return product if comm.size == 1 else np.asarray(comm.allreduce(product))
+
+
+def norm(comm: MPI.Comm, x: ComplexArray) -> float:
+    """Euclidean norm over all ranks."""
+    return float(np.sqrt(comm.allreduce(float(np.vdot(x, x).real))))

@@ -1,0 +1,28 @@
+# SPDX-License-Identifier: MIT
+"""Accuracy against cost: one scene over its knobs, and the frequency against the time domain.
+
+The work-precision study of numerical analysis (Hairer, Nørsett and Wanner, 1993, §II.10), for one
+scene: what each of its settings costs, and what error it leaves.
+"""
+
+from fenics_hytf.study.conduct import conduct
+from fenics_hytf.study.records import (
+    BudgetSpent,
+    Point,
+    Study,
+    StudyCallback,
+    StudyError,
+    StudyProgress,
+)
+from fenics_hytf.study.runs import Processes
+
+__all__ = [
+    "BudgetSpent",
+    "Point",
+    "Processes",
+    "Study",
+    "StudyCallback",
+    "StudyError",
+    "StudyProgress",
+    "conduct",
+]
