@@ -20,6 +20,7 @@ from mpi4py import MPI
 from scipy import sparse
 
 from fenics_hytf.frequency.columns import Columns
+from fenics_hytf.frequency.errors import FactorisationError
 from fenics_hytf.frequency.groups import share
 from fenics_hytf.frequency.loads import LoadFactors
 from fenics_hytf.frequency.modes import Modes, as_quadratic
@@ -32,7 +33,7 @@ Lines = npt.NDArray[np.intp]
 
 _SKETCH = 600  # sums; their norm is off by 1/√600 or so
 _ROUND_OFF = 1e-14  # a direction of a unit vector that is smaller is none
-_WEAK = 1e-4  # one that is smaller may have lost its right angle to the basis
+_STRAIGHT = 0.5  # one of which more is left is straight to round-off
 _LINES = 64  # reduced systems solved at once
 # An eigendecomposition costs as much as some 60 eliminations, of the linearised system some 200.
 _MANY, _MANY_DAMPED = 100, 400
@@ -43,8 +44,8 @@ class Basis:
     """V, orthonormal, and VᴴK_jV of every term.
 
     Args:
-        products: The system's matrices.
-        loads: Right-hand sides.
+        products: The system's matrices, in scale.
+        loads: Right-hand sides, in scale.
         lines: Complex frequencies [rad/s], shape ``(num_lines,)``.
         tolerance: Relative residual that every line must reach [-].
         across: Communicator of the ranks that hold the same part of the mesh.
@@ -66,7 +67,9 @@ class Basis:
         self.V = Columns(count)
         self._load: ComplexArray = np.empty((0, num_loads), np.complex128)
         self._terms = np.empty((len(products), 0, 0), np.complex128)
-        self._sketch = _sketch_matrix(count, self._comm.rank)
+        # Residuals are those of the forces themselves.
+        sketch = _sketch_matrix(count, self._comm.rank)
+        self._sketch = sparse.csc_matrix(sketch @ sparse.diags(1 / products.scale))
         self._sketched = np.empty((len(products), _SKETCH, 0), np.complex128)
         self._sketched_load = self._comm.allreduce(times(self._sketch, loads.vectors))
         self._known: dict[int, ComplexArray] = {}  # coordinates of lines that were factorised
@@ -96,20 +99,26 @@ class Basis:
         if not blocks:
             return np.empty((self.V.num_rows, 0), np.complex128)
         pieces = [block for block, _ in blocks]
-        wide = np.concatenate(pieces, axis=1)
-        for _ in range(2):
-            wide = self._beside_basis(wide)
+        wide = self._beside_basis(np.concatenate(pieces, axis=1))
         found = wide[:, :0]
         splits = np.cumsum([piece.shape[1] for piece in pieces])[:-1]
-        weakest = 1.0
         for (_, drop), piece in zip(blocks, np.split(wide, splits, axis=1), strict=True):
-            for _ in range(2):
-                piece, size = self._orthonormalise(self._beside(found, piece), drop)
-                weakest = min(weakest, size)
+            piece, _ = self._orthonormalise(self._beside(found, piece), drop)
             found = np.concatenate([found, piece], axis=1)
-        if weakest < _WEAK:  # what now is in the basis but for as much was round-off
-            found, _ = self._orthonormalise(self._beside_basis(found), _WEAK)
-        return found
+        return self._straighten(found, found[:, :0])
+
+    def _straighten(self, block: ComplexArray, taken: ComplexArray) -> ComplexArray:
+        """Orthonormal columns that were scaled up, again at right angles to the basis.
+
+        Args:
+            block: The columns.
+            taken: Others that they have to be at right angles to.
+        """
+        smallest = 0.0
+        while block.shape[1] and smallest < _STRAIGHT:
+            block = self._beside(taken, self._beside_basis(block))
+            block, smallest = self._orthonormalise(block, _ROUND_OFF)
+        return block
 
     def take(self, mine: ComplexArray) -> None:
         """Take what all groups have found (collective over the groups).
@@ -139,11 +148,8 @@ class Basis:
         """At right angles to what the groups before have brought in this round."""
         if not taken.shape[1]:
             return block
-        for _ in range(2):
-            block, weakest = self._orthonormalise(self._beside(taken, block), _ROUND_OFF)
-            if weakest < _WEAK:
-                block = self._beside_basis(block)
-        return block
+        block, smallest = self._orthonormalise(self._beside(taken, block), _ROUND_OFF)
+        return block if smallest > _STRAIGHT else self._straighten(block, taken)
 
     def _beside(self, basis: ComplexArray, block: ComplexArray) -> ComplexArray:
         if not basis.shape[1] or not block.shape[1]:
@@ -203,7 +209,17 @@ class Basis:
             self._known.update(known)
 
     def coordinates(self, lines: Lines) -> ComplexArray:
-        """Reduced coordinates y of some lines, shape ``(size, num_sides, len(lines))``."""
+        """Reduced coordinates y of some lines.
+
+        Args:
+            lines: Their numbers.
+
+        Returns:
+            Shape ``(size, num_sides, len(lines))``.
+
+        Raises:
+            FactorisationError: The projected matrix of a line is singular.
+        """
         y = np.empty((self.size, self._loads.norms.shape[1], len(lines)), np.complex128)
         smooth = self._smooth[lines]
         modes = self._modes_for(int(np.sum(smooth)))
@@ -225,11 +241,20 @@ class Basis:
         return y
 
     def _eliminate(self, lines: Lines) -> ComplexArray:
-        """Coordinates of lines one by one."""
+        """Coordinates of lines one by one.
+
+        Raises:
+            FactorisationError: The projected matrix of a line is singular.
+        """
         size = self.size
         A = self._factors[:, lines].T @ self._terms.reshape(len(self._terms), size * size)
         right = np.tensordot(self._load, self._loads.coordinates[:, :, lines], axes=1)
-        y = np.linalg.solve(A.reshape(len(lines), size, size), right.transpose(2, 0, 1))
+        A = A.reshape(len(lines), size, size)
+        try:
+            y = np.linalg.solve(A, right.transpose(2, 0, 1))
+        except np.linalg.LinAlgError:
+            singular = lines[np.argmin(np.linalg.matrix_rank(A))]
+            raise FactorisationError(complex(self._lines[singular])) from None
         return np.asarray(y.transpose(1, 2, 0))
 
     def _modes_for(self, count: int) -> Modes | None:
@@ -312,12 +337,13 @@ class Basis:
         x: ComplexArray = self.V @ y
         for term in range(len(self._products)):
             left = left - complex(self._factors[term, line]) * self._products(term, x)
+        left = left / self._products.scale[:, None]
         power = self._comm.allreduce(np.sum(np.abs(left) ** 2, axis=0))
         return np.asarray(np.sqrt(power) / self._loads.norms[line])
 
     def size_of_product(self, term: int, lines: Lines, y: ComplexArray) -> RealArray:
-        """|K_j x| over the load, as the basis sees it, shape ``(len(lines), num_sides)``."""
-        seen = np.tensordot(self._terms[term], y, axes=1)
+        """|K_j x| over the load, as the sketch sees it, shape ``(len(lines), num_sides)``."""
+        seen = np.tensordot(self._sketched[term], y, axes=1)
         return np.asarray(np.linalg.norm(seen, axis=0).T / self._loads.norms[lines])
 
     def _inner(self, left: ComplexArray, right: ComplexArray) -> ComplexArray:

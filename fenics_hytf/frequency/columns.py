@@ -58,6 +58,11 @@ class Columns:
         product = np.conj(np.concatenate([empty, *parts]))
         return product if comm.size == 1 else np.asarray(comm.allreduce(product))
 
+    def scale(self, factors: npt.NDArray[np.float64]) -> None:
+        """Multiply the rows by numbers, shape ``(num_rows,)``."""
+        for block in self._storage:
+            block *= factors[:, None]
+
     def seen_by(self, rows: PETSc.Mat) -> ComplexArray:
         """This rank's rows of a real matrix times V, shape ``(num_local_rows, size)``."""
         # Whole blocks, unused columns and all: those that are used alone would have to be copied.

@@ -55,6 +55,10 @@ class LoadFactors:
         before, after = max(line - 1, 0), min(line + 1, c.shape[2] - 1)
         return self.vectors @ (c[:, :, after] - c[:, :, before])
 
+    def scaled(self, scale: npt.NDArray[np.float64]) -> LoadFactors:
+        """The loads times numbers, shape ``(num_local,)``; the norms stay those of the loads."""
+        return LoadFactors(scale[:, None] * self.vectors, self.coordinates, self.norms)
+
 
 def factor_loads(
     b: PETSc.Vec | Sequence[PETSc.Vec] | Loads,

@@ -17,23 +17,35 @@ ComplexArray = npt.NDArray[np.complex128]
 
 
 class TermProducts:
-    """K_j X of each term of a system, for blocks X of this rank's rows.
+    """K_j X of each term of a system, in the scale of its stiffness.
+
+    Unknowns are taken times the root of the first term's diagonal, and forces over it: beside soft
+    ground the small motion of stiff ground would drown in the round-off of the large one.
 
     Args:
         system: The system.
+
+    Attributes:
+        scale: What an unknown was divided by to be in scale, shape ``(num_local,)``: x = scale x̂,
+            b̂ = scale b.
     """
 
     def __init__(self, system: DynamicSystem) -> None:
         self.functions = [function for _, function in system.terms]
         self.comm: MPI.Comm = system.comm.tompi4py()
         self._matrices = [matrix for matrix, _ in system.terms]
-        self._local = [real_rows(m) for m in self._matrices] if self.comm.size == 1 else []
+        self.scale = _scale(self._matrices[0], self.comm)
+        self._local: list[sparse.csr_matrix] = []
+        if self.comm.size == 1:
+            scale = sparse.diags(self.scale)
+            scaled = [scale @ real_rows(matrix) @ scale for matrix in self._matrices]
+            self._local = [sparse.csr_matrix(matrix) for matrix in scaled]
 
     def __len__(self) -> int:
         return len(self.functions)
 
     def __call__(self, term: int, X: ComplexArray) -> ComplexArray:
-        """K_j X.
+        """K̂_j X.
 
         Args:
             term: j.
@@ -44,10 +56,11 @@ class TermProducts:
         """
         if self._local:
             return times(self._local[term], X)
-        return multiply(self._matrices[term], X)
+        scale = self.scale[:, None]
+        return scale * multiply(self._matrices[term], scale * X)
 
     def weighted(self, factors: Sequence[complex], x: ComplexArray) -> ComplexArray:
-        """Σ factor_j K_j x.
+        """Σ factor_j K̂_j x.
 
         Args:
             factors: Of each term.
@@ -60,6 +73,14 @@ class TermProducts:
         for term in np.flatnonzero(factors):
             total += factors[term] * self(int(term), x[:, None])[:, 0]
         return total
+
+
+def _scale(stiffness: PETSc.Mat, comm: MPI.Comm) -> npt.NDArray[np.float64]:
+    diagonal = stiffness.getDiagonal()
+    size = np.abs(diagonal.array_r)
+    diagonal.destroy()
+    largest = comm.allreduce(float(size.max(initial=0.0)), MPI.MAX)
+    return np.asarray(1 / np.sqrt(np.where(size > 0, size, largest or 1.0)))
 
 
 def multiply(matrix: PETSc.Mat, block: ComplexArray) -> ComplexArray:

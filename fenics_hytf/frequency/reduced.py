@@ -51,7 +51,7 @@ class ReducedSweep:
             lines, sketched ones, right to some per cent, of the others.
         factorisations: Matrices factorised.
         solves: Solves with them.
-        basis: V on this rank, orthonormal.
+        basis: V on this rank.
         coordinates: y, shape ``(size, num_sides, num_lines)``.
         expansions: Lines at which a matrix was factorised.
         precision: Of responses.
@@ -74,9 +74,8 @@ class ReducedSweep:
         """Multiply every solution by a matrix; see :class:`Sweep`."""
         _, num_sides, num_lines = self.coordinates.shape
         seen = self.basis.seen_by(rows)
-        return (seen @ self.coordinates.reshape(len(self.coordinates), -1)).reshape(
-            len(seen), num_sides, num_lines
-        )
+        flat = self.coordinates.reshape(len(self.coordinates), num_sides * num_lines)
+        return (seen @ flat).reshape(len(seen), num_sides, num_lines)
 
     def response(self, weights: ComplexArray) -> Response:
         """Weigh all right-hand sides together; see :class:`Sweep`."""
@@ -125,6 +124,7 @@ def reduced_sweep(
     """
     lines = np.atleast_1d(np.asarray(s, np.complex128))
     allowed = len(lines) if budget is None else budget
+    block = min(block, len(lines))  # a line alone needs no more than its solution
     with SymmetricFactorisation(system) as factorisation:
         growth = _Growth(system, factorisation, b, lines, tolerance, across)
         wanted = [(line, block) for line in expansions] or growth.first_expansions(block)
@@ -161,7 +161,8 @@ class _Growth:
         self._vectors = system.mass.createVecs()
         self._mass = next(i for i, (m, _) in enumerate(system.terms) if m is system.mass)
         comm, num_local = self._products.comm, system.mass.getLocalSize()[0]
-        self._loads = factor_loads(b, len(lines), num_local, comm, _LOAD_ERROR * tolerance)
+        loads = factor_loads(b, len(lines), num_local, comm, _LOAD_ERROR * tolerance)
+        self._loads = loads.scaled(self._products.scale)
         self._basis = Basis(self._products, self._loads, lines, tolerance, across)
         self.residuals = np.full(self._loads.norms.shape, np.inf)
         self._coordinates: ComplexArray | None = None  # of all lines, with the basis as it is
@@ -217,13 +218,13 @@ class _Growth:
     def _solve(self, right: ComplexArray, check: bool = False) -> ComplexArray:
         """Solve with the factorisation at hand; the solution of a line itself is checked."""
         x, b = self._vectors
-        b.array[:] = right
+        b.array[:] = right / self._products.scale
         if check:
             self._factorisation.solve(b, x, self._tolerance)
         else:
             self._factorisation.backsolve(b, x)
         self._solves += 1
-        return x.array_r.copy()
+        return np.asarray(x.array_r / self._products.scale)
 
     def check(self) -> None:
         """Judge the lines that had not reached the tolerance; every line before the end."""
@@ -241,7 +242,8 @@ class _Growth:
 
     def _judge(self, lines: Lines) -> None:
         mine = lines[share(len(lines), self._across)]
-        y = self._basis.coordinates(mine)
+        with together(self._across):
+            y = self._basis.coordinates(mine)
         residuals = self._basis.sketched_residuals(mine, y)
         if self._across.size > 1:
             parts = self._across.allgather((residuals, y))
@@ -263,7 +265,7 @@ class _Growth:
             self.residuals[line] = self._basis.true_residuals(line, self._coordinates[:, :, line])
 
     def _require_no_resonance(self) -> None:
-        """|s² VᴴMV y| against |b|, as the direct sweep looks at |s² M x|."""
+        """|s² M x| against |b|, as the direct sweep looks at it."""
         assert self._coordinates is not None
         everything = np.arange(len(self._lines))
         inertia = self._basis.size_of_product(self._mass, everything, self._coordinates)
@@ -311,6 +313,7 @@ class _Growth:
         y = self._coordinates
         if y is None:  # without a line
             y = np.empty((self._basis.size, self._loads.norms.shape[1], 0), np.complex128)
+        self._basis.V.scale(self._products.scale)
         return ReducedSweep(
             self._lines,
             self.residuals,

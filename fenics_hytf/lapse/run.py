@@ -141,7 +141,7 @@ def solve(
             sweeps.iterated,
             strain_from,
         )
-        if sweeps.tolerance > scene.solver.tolerance:
+        if sweeps.tolerance > sweeps.finest:
             sweeps.solve(moduli, len(loop.change))
     assert sweeps.last is not None
     constants, sweep = sweeps.constants, sweeps.last
@@ -164,7 +164,11 @@ class _Sweeps:
         self._change = 1.0
         self._expansions: tuple[int, ...] = ()
         self.tally = Tally()
-        self.tolerance = self._solver.tolerance
+        loop = scene.effects.equivalent_linear
+        self.finest = self._solver.tolerance
+        if loop is not None:  # what the strain is off by must not keep the loop from its end
+            self.finest = min(self.finest, _SHARE * loop.tolerance)
+        self.tolerance = self.finest
         self.last: Sweep | None = None
 
     def iterated(self, iteration: int, change: float) -> None:
@@ -175,7 +179,7 @@ class _Sweeps:
     @property
     def tolerance_so_far(self) -> float:
         """What an iteration needs: a hundredth of what the moduli still change by."""
-        return max(self._solver.tolerance, min(_LOOSEST, _SHARE * self._change))
+        return max(self.finest, min(_LOOSEST, _SHARE * self._change))
 
     def solve(self, moduli: Moduli, iteration: int, tolerance: float | None = None) -> Sweep:
         """Sweep with some moduli.
@@ -183,8 +187,8 @@ class _Sweeps:
         Args:
             moduli: The moduli.
             iteration: Number of the iteration.
-            tolerance: Relative residual of every line [-]; the scene's if ``None``. A direct sweep
-                is as good as it is.
+            tolerance: Relative residual of every line [-]; if ``None`` the scene's, or what the
+                end of its loop needs. A direct sweep is as good as it is.
 
         Returns:
             The sweep.
@@ -204,7 +208,7 @@ class _Sweeps:
             if solver.sweep == "direct":
                 sweep = direct_sweep(*arguments, solver.tolerance, report, across)
             else:
-                self.tolerance = solver.tolerance if tolerance is None else tolerance
+                self.tolerance = self.finest if tolerance is None else tolerance
                 reduced = reduced_sweep(
                     *arguments,
                     self.tolerance,

@@ -200,7 +200,7 @@ class Solver(Table):
         excited: A line is excited above this fraction of the spectral peak [-].
     """
 
-    sweep: Literal["direct", "reduced"] = Field("direct", description='"direct" or "reduced"')
+    sweep: Literal["direct", "reduced"] = Field("reduced", description='"direct" or "reduced"')
     complex_modulus: Literal["hysteretic", "kramer", "shake91", "dormieux"] = Field(
         "hysteretic", description='"hysteretic", "kramer", "shake91" or "dormieux"'
     )

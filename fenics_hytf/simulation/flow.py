@@ -46,6 +46,7 @@ from fenics_hytf.simulation.records import (
     Progress,
     ProgressCallback,
     Result,
+    Snapshot,
     SnapshotCallback,
     Work,
 )
@@ -299,7 +300,11 @@ class _Run:
 
     def show(self, solved: Solved, index: int, stop: int, snapshot: SnapshotCallback) -> None:
         """Hand points and fields to whoever writes them."""
+        time = stop * self.scene.dt
         with self.clock.phase("output"):
+            if self.domain.across.rank > 0:  # the first group has it all
+                snapshot(Snapshot(index, time, None))
+                return
             snapshot(
                 take_snapshot(
                     self.scene,
@@ -308,7 +313,7 @@ class _Run:
                     lambda time: self._nodal_motion(solved, time),
                     solved.moduli,
                     self.lapses[-1],
-                    stop * self.scene.dt,
+                    time,
                 )
             )
 

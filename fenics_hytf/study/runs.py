@@ -42,7 +42,8 @@ _SOLVING = (
     "lapse",
     "simulation",
 )
-_STUDY = ("worker.py", "newmark.py", "matrices.py")
+_WORKER = ("worker.py",)
+_MARCHING = ("newmark.py", "matrices.py")
 _ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -65,7 +66,9 @@ class Job:
     def key(self) -> str:
         """Hash of everything the outcome depends on."""
         digest = hashlib.sha256(self.scene.hash.encode())
-        digest.update(f"{self.method} {self.substeps} {self.scene.dt!r} {_code()}".encode())
+        digest.update(
+            f"{self.method} {self.substeps} {self.scene.dt!r} {_code(self.method)}".encode()
+        )
         digest.update(self.scene.base_acceleration.tobytes())
         if self.scene.mesh.file is not None:
             digest.update(self.scene.mesh.file.read_bytes())
@@ -226,11 +229,12 @@ def _execute(place: Path, limit: float | None) -> str:
 
 
 @cache
-def _code() -> str:
-    """Hash of the code that an outcome depends on."""
+def _code(method: str) -> str:
+    """Hash of the code that an outcome of a method depends on."""
     digest = hashlib.sha256()
     package = Path(fenics_hytf.__file__).resolve().parent
     files = [file for room in _SOLVING for file in sorted((package / room).glob("*.py"))]
-    for file in files + [package / "study" / name for name in _STUDY]:
-        digest.update(file.read_bytes() if file.exists() else b"")
+    names = _WORKER if method == "simulate" else _WORKER + _MARCHING
+    for file in files + [package / "study" / name for name in names]:
+        digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -257,7 +257,6 @@ def test_plot_needs_a_finished_result(here, hytf, folder):
     assert [p.name for p in here.iterdir()] == ["s.toml"]
 
 
-
 def test_version(hytf):
     code, out, _ = hytf("--version")
     assert code == 0 and out.startswith("hytf 0.")

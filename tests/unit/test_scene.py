@@ -84,7 +84,7 @@ def test_defaults():
     assert s.effects.equivalent_linear is None and s.effects.rayleigh is None
     assert s.points.outside == "error"
     assert (s.solver.sweep, s.solver.complex_modulus, s.solver.keep) == (
-        "direct",
+        "reduced",
         "hysteretic",
         "poisson",
     )

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from support.meshes import SOIL, gmsh_block, gmsh_section, scene
 
 from fenics_hytf.lapse import EquivalentLinearError
-from fenics_hytf.scene import SceneError
+from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import SimulationError, simulate
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
@@ -76,9 +76,22 @@ def worst_difference(mine, alone) -> float:
     return worst
 
 
+def solved(case, sweep):
+    return Scene.from_dict(case.data | {"solver": case.data.get("solver", {}) | {"sweep": sweep}})
+
+
 def agree(case, figure, name):
-    mine = simulate(case, WORLD)
+    """Ranks that share the mesh, and ranks that share out the lines, against one alone."""
+    case = solved(case, "direct")
     alone = simulate(case, SELF)
+    for size, way in ((WORLD.size, "mesh"), (1, "lines")):
+        mine = simulate(case, WORLD, group_size=size)
+        assert mine.group_size == size
+        agrees(mine, alone, figure, f"{name}, {way} shared")
+    return mine
+
+
+def agrees(mine, alone, figure, name):
     for count in COUNTS:
         assert getattr(mine.work, count) == getattr(alone.work, count), count
     assert mine.sizes == alone.sizes
@@ -88,7 +101,6 @@ def agree(case, figure, name):
     assert np.any(surface)
     np.testing.assert_array_equal(surface, WORLD.bcast(surface))
     figure(f"{WORLD.size} ranks against one, {name}", worst_difference(mine, alone), LIMIT)
-    return mine
 
 
 def test_column_with_the_equivalent_linear_loop(figure):
@@ -279,6 +291,7 @@ def test_a_snapshot_of_the_fields_does_not_depend_on_the_ranks(figure):
         {"box": {"size": [6.0, 4.0], "cells": [6, 4], "cell": "triangle"}, "degree": 2},
         soil={"clay": DAMPED},
         motion=[record()],
+        solver={"sweep": "direct"},
         output={"receivers": {"top": [3.0, 4.0]}, "fields": True},
     )
     taken = {}
@@ -299,6 +312,42 @@ def test_a_snapshot_of_the_fields_does_not_depend_on_the_ranks(figure):
     else:
         assert mine.points is None
     figure(f"{WORLD.size} ranks against one, snapshot", worst, LIMIT)
+
+
+@pytest.mark.parametrize("sides", ["free_field", "dashpot"])
+def test_the_reduced_sweep_in_groups(sides, figure):
+    """Each group brings expansion points of its own: other bases, the same tolerance."""
+    effects = {"equivalent_linear": {"tolerance": 1e-8}}
+    case = layered("quadrilateral", sides, "xy", effects=effects)
+    tolerance = case.solver.tolerance
+    alone = simulate(solved(case, "direct"), SELF)
+    for size in (1, WORLD.size):
+        mine = simulate(solved(case, "reduced"), WORLD, group_size=size)
+        assert mine.lapses[0].worst_residual <= tolerance
+        for name in HISTORIES[:-1]:
+            found, expected = mine.history(name), alone.history(name)
+            np.testing.assert_array_equal(found, WORLD.bcast(found))
+            error = abs(found - expected).max() / abs(expected).max()
+            figure(
+                f"reduced in groups of {size} of {WORLD.size}, {sides}, {name}",
+                error,
+                10 * tolerance,
+            )
+
+
+def test_memory_asks_for_no_more_than_a_rank_a_group():
+    case = layered("quadrilateral", "dashpot", "x")
+    assert simulate(case, WORLD).group_size == 1
+    with pytest.raises(ValueError, match=r"group size: found 5, with \d ranks; expected one of 1"):
+        simulate(case, WORLD, group_size=5)
+
+
+def test_no_more_groups_than_lines():
+    wave = {"amplitude": 0.1, "frequency": 1.0, "cycles": 1, "samples": 8}
+    case = layered("quadrilateral", "tied", "x")
+    motion = [{"direction": "x", "harmonic": wave, "input": "outcrop"}]
+    result = simulate(Scene.from_dict(case.data | {"motion": motion}), WORLD)
+    assert result.lapses[0].solved_lines == 1 and result.group_size == WORLD.size
 
 
 # ---------------------------------------------------------------- every rank stops alike

@@ -27,6 +27,7 @@ def solve(mesh, motions, boundary, receivers, soil=SOIL):
         "soil": soil,
         "motion": motions,
         "boundary": boundary,
+        "solver": {"sweep": "direct"},  # to round-off
         "output": {"receivers": receivers},
     }
     return simulate(Scene.from_dict(scene)).lapses[0]
