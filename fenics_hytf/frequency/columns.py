@@ -12,7 +12,7 @@ from fenics_hytf.frequency.products import multiply, real_rows, times
 
 ComplexArray = npt.NDArray[np.complex128]
 
-_WIDTH = 32  # columns of a block: products with a block run at full speed, little is left unused
+_WIDTH = 64  # columns of a block: products with it run at full speed, little is left unused
 
 
 class Columns:
@@ -28,7 +28,7 @@ class Columns:
 
     @property
     def blocks(self) -> list[ComplexArray]:
-        """The columns there are, side by side, each shape ``(num_rows, 32 or fewer)``."""
+        """The columns there are, side by side, each shape ``(num_rows, 64 or fewer)``."""
         widths = np.clip(self.size - _WIDTH * np.arange(len(self._storage)), 0, _WIDTH)
         return [block[:, :width] for block, width in zip(self._storage, widths, strict=True)]
 

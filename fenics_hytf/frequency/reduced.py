@@ -32,7 +32,7 @@ ComplexArray = npt.NDArray[np.complex128]
 RealArray = npt.NDArray[np.float64]
 Lines = npt.NDArray[np.intp]
 
-_MARGIN = 0.5  # sketched residuals stay below this fraction of the tolerance
+_MARGIN = 0.8  # sketched residuals, right to 4 %, stay below this fraction of the tolerance
 _STRIDE = 4  # lines of the first check: every fourth
 _DROP = 1e-8  # directions that a block has in common with the basis but for this are dropped
 _ROUND_OFF = 1e-14  # all of a solution is kept: what it holds of stiff directions may be small

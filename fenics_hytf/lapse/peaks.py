@@ -57,17 +57,23 @@ _VECTORISED = {"nnan", "nsz", "reassoc"}
 def _largest_square(vector: Histories) -> RealArray:
     count, components, samples = vector.shape
     peak = np.zeros(count)
-    square = np.empty(samples)
+    square = np.empty(samples, vector.dtype)
     for i in range(count):
-        square[:] = 0.0
-        for c in range(components):
-            for t in range(samples):
-                square[t] += np.float64(vector[i, c, t]) ** 2
-        largest = 0.0
         for t in range(samples):
-            largest = max(largest, square[t])
-        peak[i] = largest
+            square[t] = vector[i, 0, t] * vector[i, 0, t]
+        for c in range(1, components):
+            for t in range(samples):
+                square[t] += vector[i, c, t] * vector[i, c, t]
+        peak[i] = _largest(square)
     return peak
+
+
+@njit(cache=True, fastmath=_VECTORISED)
+def _largest(values: Histories) -> float:
+    largest = values.dtype.type(0)
+    for t in range(len(values)):
+        largest = max(largest, values[t])
+    return largest
 
 
 @njit(cache=True, fastmath=_VECTORISED)
@@ -75,17 +81,17 @@ def _in_plane(strain: Histories, third: bool) -> RealArray:
     """In a plane, with the third principal strain of nought where it counts."""
     count, _, samples = strain.shape
     peak = np.zeros(count)
-    difference = np.empty(samples)
+    value = np.empty(samples, strain.dtype)
     for i in range(count):
         for t in range(samples):
-            xx, yy = np.float64(strain[i, 0, t]), np.float64(strain[i, 1, t])
-            difference[t] = np.sqrt((xx - yy) ** 2 + np.float64(strain[i, 2, t]) ** 2)
-            if third:  # top over nought minus bottom under nought
-                difference[t] = max(difference[t], (abs(xx + yy) + difference[t]) / 2)
-        largest = 0.0
-        for t in range(samples):
-            largest = max(largest, difference[t])
-        peak[i] = largest
+            across = strain[i, 0, t] - strain[i, 1, t]
+            value[t] = across * across + strain[i, 2, t] * strain[i, 2, t]
+        if third:  # top over nought minus bottom under nought
+            for t in range(samples):
+                difference = np.sqrt(value[t])
+                both = abs(strain[i, 0, t] + strain[i, 1, t])
+                value[t] = max(difference, (both + difference) / 2)
+        peak[i] = _largest(value) if third else np.sqrt(_largest(value))
     return peak
 
 

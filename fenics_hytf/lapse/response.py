@@ -7,6 +7,7 @@ not solved counts as zero in the response and in the base acceleration that is a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,7 +31,8 @@ from fenics_hytf.particles import (
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-_BLOCK = 64  # cells whose histories are held at once: they stay in the cache
+_BLOCK = 256  # cells whose spectra are held at once
+_FEW = 64  # cells whose histories are held at once: they stay in the cache
 
 
 @dataclass(frozen=True)
@@ -250,8 +252,8 @@ class CellProbe:
         peak = np.zeros((self._domain.num_owned_cells, 1))
         response = sweep.response(excitation.weights)
         for cells, strain, _ in self._blocks:
-            spectra = _by_cell(response(strain), cells)
-            peak[cells, 0] = peak_shear_strain(excitation.to_time(spectra), self._convention)
+            for some, spectra in _by_few(cells, response(strain)):
+                peak[some, 0] = peak_shear_strain(excitation.to_time(spectra), self._convention)
         return self._gather(peak)[:, 0]
 
     def peaks(
@@ -276,15 +278,15 @@ class CellProbe:
         still = excitation.respond(base)
         response = sweep.response(excitation.weights)
         for cells, strain, place in self._blocks:
-            spectra = _by_cell(response(strain), cells)
-            # G* is real at ω = 0.
-            factor = np.where(at_rest, mine[cells, None].real, mine[cells, None])[:, None, :]
-            for column, values in enumerate((spectra, factor.astype(spectra.dtype) * spectra)):
-                history = excitation.to_time(values)
-                peak[cells, column] = peak_shear_strain(history, self._convention)
-            u = _by_cell(response(place), cells)
-            for column, values in enumerate(_motions(u, still, excitation), start=2):
-                peak[cells, column] = peak_length(excitation.to_time(values))
+            for some, spectra in _by_few(cells, response(strain)):
+                # G* is real at ω = 0.
+                factor = np.where(at_rest, mine[some, None].real, mine[some, None])[:, None, :]
+                for column, values in enumerate((spectra, factor.astype(spectra.dtype) * spectra)):
+                    history = excitation.to_time(values)
+                    peak[some, column] = peak_shear_strain(history, self._convention)
+            for some, u in _by_few(cells, response(place)):
+                for column, values in enumerate(_motions(u, still, excitation), start=2):
+                    peak[some, column] = peak_length(excitation.to_time(values))
         return CellPeaks(*self._gather(peak).T)
 
     def _gather(self, peak: RealArray) -> RealArray:
@@ -294,11 +296,14 @@ class CellProbe:
         return self._domain.gather_cells(peak)
 
 
-def _by_cell(spectra: ComplexArray, cells: slice) -> ComplexArray:
-    """Rows of a block, shape ``(num_cells, num_values, num_lines)``."""
+def _by_few(cells: slice, spectra: ComplexArray) -> Iterator[tuple[slice, ComplexArray]]:
+    """Rows of a block, a few cells at a time, shape ``(num_cells, num_values, num_lines)``."""
     count = cells.stop - cells.start
-    values = len(spectra) // count if count else 1
-    return spectra.reshape(count, values, spectra.shape[-1])
+    if count:
+        by_cell = spectra.reshape(count, len(spectra) // count, spectra.shape[-1])
+        for first in range(0, count, _FEW):
+            stop = min(first + _FEW, count)
+            yield slice(cells.start + first, cells.start + stop), by_cell[first:stop]
 
 
 def _motions(

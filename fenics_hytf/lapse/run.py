@@ -22,8 +22,8 @@ from fenics_hytf.scene import Scene
 RealArray = npt.NDArray[np.float64]
 
 _LOOSEST = 1e-2  # residual of a sweep that only tells the loop where to go
-# Directions a factorisation is used for: it costs 6 to 7 solves in sections, some 40 in solids.
-_BLOCK = {2: 10, 3: 24}
+# Directions a factorisation is used for: it costs 6 to 8 solves in sections, some 40 in solids.
+_BLOCK = {2: 14, 3: 24}
 _SHARE = 1e-2  # of the last change of the moduli, as a residual
 
 

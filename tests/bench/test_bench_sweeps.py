@@ -147,7 +147,7 @@ def test_error_at_every_tenth_line_and_at_resonances(ground, tmp_path, figure):
     lines = 1j * np.sort(np.concatenate([2 * np.pi * frequencies, modes]))
     looked_at = np.union1d(np.arange(9, len(lines), 10), np.searchsorted(lines.imag, modes))
     found = reduced_sweep(
-        lapse.system, lapse.loads, lines, TOLERANCE, block={"section": 10, "block": 24}[ground]
+        lapse.system, lapse.loads, lines, TOLERANCE, block={"section": 14, "block": 24}[ground]
     )
     direct = direct_sweep(lapse.system, lapse.loads, lines[looked_at], TOLERANCE)
     norm = np.linalg.norm
