@@ -9,6 +9,7 @@ from fenics_hytf.frequency.errors import (
     ResonanceError,
     SweepError,
 )
+from fenics_hytf.frequency.groups import share
 from fenics_hytf.frequency.loads import Loads
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
 from fenics_hytf.frequency.sweep import DenseSweep, Sweep
@@ -38,4 +39,5 @@ __all__ = [
     "hysteretic",
     "radiation",
     "reduced_sweep",
+    "share",
 ]

@@ -127,7 +127,7 @@ def reduced_sweep(
     block = min(block, len(lines))  # a line alone needs no more than its solution
     with SymmetricFactorisation(system) as factorisation:
         growth = _Growth(system, factorisation, b, lines, tolerance, across)
-        wanted = [(line, block) for line in expansions] or growth.first_expansions(block)
+        wanted = growth.first_expansions(expansions, block)
         while wanted:
             left = allowed - len(growth.expansions)
             if left <= 0:
@@ -274,11 +274,16 @@ class _Growth:
         if growth[worst] > RESONANCE:
             raise ResonanceError(complex(self._lines[worst]), float(growth[worst]))
 
-    def first_expansions(self, block: int) -> list[tuple[int, int]]:
-        """Where to begin: amid the lines, a point a group."""
-        count = len(self._lines)
-        places = [count * (2 * g + 1) // (2 * self._across.size) for g in range(self._across.size)]
-        return [(line, block) for line in dict.fromkeys(places)] if count else []
+    def first_expansions(self, known: Sequence[int], block: int) -> list[tuple[int, int]]:
+        """Where to begin: at known lines, or amid the lines, a point a group.
+
+        And where s is real: a response at rest is real, which a projection on complex directions
+        is not; the solution itself is.
+        """
+        count, groups = len(self._lines), self._across.size
+        amid = [count * (2 * g + 1) // (2 * groups) for g in range(groups)] if count else []
+        real = np.flatnonzero(self._lines.imag == 0).tolist()
+        return [(line, block) for line in dict.fromkeys([*(known or amid), *real])]
 
     def next_expansions(self, block: int) -> list[tuple[int, int]]:
         """Where to expand next, if anywhere, and in how many directions; a point a group.

@@ -47,6 +47,8 @@ from fenics_hytf.soil import wave_factors
 
 RealArray = npt.NDArray[np.float64]
 
+_PRODUCT = "matptap_via"  # how PETSc multiplies TᵀAT
+
 
 class SideForce(Protocol):
     """What the ground beyond a side does to it; see :mod:`fenics_hytf.lapse.free_field`."""
@@ -200,7 +202,12 @@ class Equations:
     def _constrain(self, name: str, matrix: PETSc.Mat) -> PETSc.Mat:
         """A_q = TᵀAT, into the matrix kept under a name."""
         kept = self._constrained.get(name)
+        options = PETSc.Options()
+        if kept is None and matrix.comm.size > 1:
+            options[_PRODUCT] = "allatonce"  # without the product AT, half of all memory
         self._constrained[name] = matrix.ptap(self.T, result=kept)
+        if options.hasName(_PRODUCT):
+            options.delValue(_PRODUCT)
         return self._constrained[name]
 
     def _stiffness(self, name: str, constants: ElasticConstants) -> PETSc.Mat:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +18,15 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.frequency import Sweep
+from fenics_hytf.frequency import Sweep, share
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.motion import to_time
-from fenics_hytf.operators import constrained_rows, displacement_rows, strain_rows
+from fenics_hytf.operators import (
+    constrained_rows,
+    displacement_rows,
+    split_rows,
+    strain_rows,
+)
 from fenics_hytf.particles import (
     Sites,
     cell_centres,
@@ -32,6 +38,7 @@ RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 _BLOCK = 256  # cells whose spectra are held at once
+_AT_ONCE = 64  # blocks whose rows are made at once
 _FEW = 64  # cells whose histories are held at once: they stay in the cache
 
 
@@ -221,17 +228,29 @@ class CellProbe:
 
     def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
         self._domain, self._convention = domain, convention
-        owned = domain.num_owned_cells
-        blocks = domain.comm.allreduce(-(-owned // _BLOCK), MPI.MAX)
+        blocks = domain.comm.allreduce(-(-domain.num_owned_cells // _BLOCK), MPI.MAX)
+        mine = range(blocks)[share(blocks, domain.across)]
         self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
-        for block in range(domain.across.rank, blocks, domain.across.size):
-            first, stop = min(block * _BLOCK, owned), min((block + 1) * _BLOCK, owned)
-            centres = cell_centres(domain.mesh, first, stop)
-            count = domain.num_components
-            strain = strain_rows(gradient_matrices(centres, domain.V), count)
-            place = displacement_rows(transfer_matrix(centres, domain.V), count)
-            rows = (constrained_rows(domain, r, T) for r in (strain, place))
-            self._blocks.append((slice(first, stop), *rows))
+        for first in range(mine.start, mine.stop, _AT_ONCE):
+            self._blocks += self._rows(T, range(first, min(first + _AT_ONCE, mine.stop)))
+
+    def _rows(self, T: PETSc.Mat, blocks: range) -> list[tuple[slice, PETSc.Mat, PETSc.Mat]]:
+        """Cells of some blocks, and the rows that evaluate their strain and displacement."""
+        domain, owned = self._domain, self._domain.num_owned_cells
+        bounds = [min(b * _BLOCK, owned) for b in range(blocks.start, blocks.stop + 1)]
+        centres = cell_centres(domain.mesh, bounds[0], bounds[-1])
+        count = domain.num_components
+        parts = []
+        for local in (
+            strain_rows(gradient_matrices(centres, domain.V), count),
+            displacement_rows(transfer_matrix(centres, domain.V), count),
+        ):
+            rows = constrained_rows(domain, local, T)
+            a_cell = local.shape[0] // max(len(centres), 1)
+            parts.append(split_rows(rows, [a_cell * (bound - bounds[0]) for bound in bounds]))
+            rows.destroy()
+        cells = [slice(first, stop) for first, stop in pairwise(bounds)]
+        return list(zip(cells, *parts, strict=True))
 
     def destroy(self) -> None:
         """Destroy the rows."""

@@ -4,7 +4,12 @@
 from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
-from fenics_hytf.operators.rows import constrained_rows, displacement_rows, strain_rows
+from fenics_hytf.operators.rows import (
+    constrained_rows,
+    displacement_rows,
+    split_rows,
+    strain_rows,
+)
 
 __all__ = [
     "DashpotForm",
@@ -17,5 +22,6 @@ __all__ = [
     "displacement_rows",
     "mean_rows",
     "rayleigh_damping",
+    "split_rows",
     "strain_rows",
 ]

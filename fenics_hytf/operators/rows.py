@@ -8,6 +8,7 @@ from the same transfer matrices that weigh the points.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from petsc4py import PETSc
@@ -99,3 +100,27 @@ def constrained_rows(domain: Domain, local: sparse.csr_matrix, T: PETSc.Mat) -> 
     rows.destroy()
     product.destroy()
     return result
+
+
+def split_rows(rows: PETSc.Mat, bounds: Sequence[int]) -> list[PETSc.Mat]:
+    """Matrices of some rows each (collective).
+
+    Args:
+        rows: The rows of all of them.
+        bounds: First of this rank's rows of each, and one after the last; as many on every rank.
+
+    Returns:
+        The matrices; the caller destroys them.
+    """
+    start, columns, values = rows.getValuesCSR()
+    blocks = []
+    for first, stop in pairwise(bounds):
+        mine = slice(start[first], start[stop])
+        blocks.append(
+            PETSc.Mat().createAIJ(
+                ((stop - first, None), (rows.getLocalSize()[1], None)),
+                csr=(start[first : stop + 1] - start[first], columns[mine], values[mine]),
+                comm=rows.comm,
+            )
+        )
+    return blocks
