@@ -282,7 +282,7 @@ class _Growth:
         """
         count, groups = len(self._lines), self._across.size
         amid = [count * (2 * g + 1) // (2 * groups) for g in range(groups)] if count else []
-        real = np.flatnonzero(self._lines.imag == 0).tolist()
+        real = [line for line, s in enumerate(self._lines) if s.imag == 0]
         return [(line, block) for line in dict.fromkeys([*(known or amid), *real])]
 
     def next_expansions(self, block: int) -> list[tuple[int, int]]:

@@ -69,7 +69,7 @@ def _largest_square(vector: Histories) -> RealArray:
 
 
 @njit(cache=True, fastmath=_VECTORISED)
-def _largest(values: Histories) -> float:
+def _largest(values: Histories) -> np.floating:
     largest = values.dtype.type(0)
     for t in range(len(values)):
         largest = max(largest, values[t])

@@ -6,6 +6,7 @@ from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.flow import simulate
 from fenics_hytf.simulation.groups import group_faults
 from fenics_hytf.simulation.inspection import Inspection, inspect
+from fenics_hytf.simulation.memory import peak_memory
 from fenics_hytf.simulation.records import (
     Progress,
     ProgressCallback,
@@ -27,5 +28,6 @@ __all__ = [
     "group_faults",
     "inspect",
     "mesh_faults",
+    "peak_memory",
     "simulate",
 ]

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import logging
-import resource
 from collections import Counter
 from dataclasses import replace
 
@@ -41,6 +40,7 @@ from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.groups import Groups, form_groups, require_same_parts
+from fenics_hytf.simulation.memory import peak_memory
 from fenics_hytf.simulation.receivers import Receivers
 from fenics_hytf.simulation.records import (
     Progress,
@@ -341,7 +341,6 @@ class _Run:
     def result(self) -> Result:
         """Everything so far."""
         self._work.assemblies = dict(self._assemblies)
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
         return Result(
             scene=self.scene,
             num_ranks=self.comm.size,
@@ -360,5 +359,5 @@ class _Run:
                 "points": self._ledger.num_points,
             },
             work=self._work,
-            peak_memory=self.comm.allreduce(memory, MPI.MAX),
+            peak_memory=self.comm.allreduce(peak_memory(), MPI.MAX),
         )

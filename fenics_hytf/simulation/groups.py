@@ -9,13 +9,13 @@ share a node as well.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 from mpi4py import MPI
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.inspection import inspect
+from fenics_hytf.simulation.memory import free_memory
 
 _SHARE = 0.8  # of a node's free memory that may be planned with: estimates are rough
 
@@ -120,14 +120,4 @@ def _memory_of_node(comm: MPI.Comm) -> tuple[int, int]:
     node = comm.Split_type(MPI.COMM_TYPE_SHARED)
     ranks = node.size
     node.Free()
-    return comm.allreduce(_free_memory(), MPI.MIN), comm.allreduce(ranks, MPI.MAX)
-
-
-def _free_memory() -> int:
-    """What the system, or the container's limit, leaves to new processes [bytes]."""
-    lines = Path("/proc/meminfo").read_text().splitlines()
-    free = next(int(line.split()[1]) * 1024 for line in lines if line.startswith("MemAvailable"))
-    limit, used = (Path(f"/sys/fs/cgroup/memory.{name}") for name in ("max", "current"))
-    if limit.exists() and limit.read_text().strip() != "max":
-        free = min(free, int(limit.read_text()) - int(used.read_text()))
-    return free
+    return comm.allreduce(free_memory(), MPI.MIN), comm.allreduce(ranks, MPI.MAX)

@@ -9,7 +9,6 @@ lowest lines alone. A run of less than two seconds is repeated and its fastest r
 
 from __future__ import annotations
 
-import resource
 import sys
 import time
 from collections.abc import Callable
@@ -21,7 +20,7 @@ import numpy.typing as npt
 
 from fenics_hytf.motion import excited_lines, to_frequency
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation import SimulationError, simulate
+from fenics_hytf.simulation import SimulationError, peak_memory, simulate
 from fenics_hytf.study.newmark import integrate
 from fenics_hytf.study.runs import Cost, Job, read_job, write_outcome
 
@@ -140,21 +139,6 @@ def measured(job: Job, folder: Path) -> tuple[Cost, RealArray]:
         cells=work.cells,
     )
     return cost, response
-
-
-def peak_memory() -> int:
-    """Peak resident memory of this program [bytes].
-
-    Linux hands the peak that ``getrusage`` tells on to the programs a process starts; the one in
-    ``/proc`` is this program's own.
-    """
-    try:
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
-    return (
-        next(int(row.split()[1]) for row in status.splitlines() if row.startswith("VmHWM")) * 1024
-    )
 
 
 def _action(job: Job) -> Callable[[], tuple[RealArray, Work]]:
