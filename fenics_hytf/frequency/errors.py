@@ -61,7 +61,8 @@ class ResidualError(SweepError):
         super().__init__(
             s,
             f"found a relative residual of {residual:.3g}; expected at most {tolerance:.3g}: the "
-            "line may be an undamped resonance; add damping or loosen solver.tolerance",
+            "line may be an undamped resonance, or stiff ground ride on ground a million times as "
+            "soft, where round-off is larger; add damping or loosen solver.tolerance",
         )
 
 
