@@ -84,6 +84,8 @@ def _prepare(request: RunRequest, comm: MPI.Comm, budget: float | None) -> tuple
                 "output.receivers: found none; expected at least one: its motion is what settings "
                 "are compared by"
             )
+        if not scene.base_acceleration.any():
+            faults.append("motion: found none but zeros; expected one that moves the receivers")
     if faults or scene is None or domain is None:
         raise InputError(faults)
     return scene, str(domain.mesh.topology.cell_name())

@@ -24,6 +24,7 @@ RealArray = npt.NDArray[np.float64]
 _LOOSEST = 1e-2  # residual of a sweep that only tells the loop where to go
 # Directions a factorisation is used for: it costs 6 to 8 solves in sections, some 40 in solids.
 _BLOCK = {2: 14, 3: 24}
+_IN_REACH = 1e-10  # residual that round-off leaves in reach of every reduced sweep
 _SHARE = 1e-2  # of the last change of the moduli, as a residual
 
 
@@ -167,7 +168,8 @@ class _Sweeps:
         loop = scene.effects.equivalent_linear
         self.finest = self._solver.tolerance
         if loop is not None:  # what the strain is off by must not keep the loop from its end
-            self.finest = min(self.finest, _SHARE * loop.tolerance)
+            needed = max(_SHARE * loop.tolerance, _IN_REACH)
+            self.finest = min(self.finest, needed)
         self.tolerance = self.finest
         self.last: Sweep | None = None
 

@@ -127,6 +127,7 @@ def test_overrides_reach_the_scene(here, hytf, at_hand):
         (["--set", "solver.swep=direct"], "swep"),
         (["--set", "output.receivers={}"], "output.receivers: found none"),
         (["--set", "output.receivers.top=[9.0,9.0]"], "output.receivers.top"),
+        (["--set", "motion.0.harmonic.amplitude=0.0"], "motion: found none but zeros"),
         (["--budget", "0"], "--budget"),
         (["-o", "s.toml"], "is no folder"),
     ],
