@@ -121,13 +121,20 @@ def test_overrides_reach_the_scene(here, hytf, at_hand):
     assert at_hand[0].scene.solver.sweep == "direct"
 
 
+def test_a_motion_of_zeros_is_wrong_input(here, hytf, at_hand):
+    rows = "".join(f"{0.02 * k},0.0\n" for k in range(64))
+    (here / "zeros.csv").write_text("time_s,acceleration\n" + rows)
+    code, out, err = hytf("accuracy", "s.toml", "--motion", "zeros.csv")
+    assert (code, out) == (2, "") and "motion: found none but zeros" in err
+    assert not (here / "s-accuracy").exists()
+
+
 @pytest.mark.parametrize(
     "arguments, said",
     [
         (["--set", "solver.swep=direct"], "swep"),
         (["--set", "output.receivers={}"], "output.receivers: found none"),
         (["--set", "output.receivers.top=[9.0,9.0]"], "output.receivers.top"),
-        (["--set", "motion.0.harmonic.amplitude=0.0"], "motion: found none but zeros"),
         (["--budget", "0"], "--budget"),
         (["-o", "s.toml"], "is no folder"),
     ],
