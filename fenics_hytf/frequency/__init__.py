@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Sweeps over frequencies of an affine complex symmetric system."""
 
+from fenics_hytf.frequency.columns import Columns
 from fenics_hytf.frequency.direct import SymmetricFactorisation, direct_sweep
 from fenics_hytf.frequency.errors import (
     FactorisationError,
@@ -10,9 +11,10 @@ from fenics_hytf.frequency.errors import (
     SweepError,
 )
 from fenics_hytf.frequency.groups import share
-from fenics_hytf.frequency.loads import Loads
+from fenics_hytf.frequency.loads import AffineLoads, Loads
+from fenics_hytf.frequency.products import multiply
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
-from fenics_hytf.frequency.sweep import DenseSweep, Sweep
+from fenics_hytf.frequency.sweep import DenseSweep, JoinedSweep, Sweep
 from fenics_hytf.frequency.system import (
     DynamicSystem,
     ScalarFunction,
@@ -22,9 +24,12 @@ from fenics_hytf.frequency.system import (
 )
 
 __all__ = [
+    "AffineLoads",
+    "Columns",
     "DenseSweep",
     "DynamicSystem",
     "FactorisationError",
+    "JoinedSweep",
     "Loads",
     "ReducedSweep",
     "ReductionError",
@@ -37,6 +42,7 @@ __all__ = [
     "constant",
     "direct_sweep",
     "hysteretic",
+    "multiply",
     "radiation",
     "reduced_sweep",
     "share",

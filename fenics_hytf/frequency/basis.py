@@ -3,7 +3,8 @@
 
 x(s) ≈ V y(s) with (Σ f_j(s) VᴴK_jV) y = Vᴴb; Vᴴ and not Vᵀ, so that the reduced matrix of a damped
 system is regular. The residual of a line is judged from a sketch: a few hundred signed sums of its
-entries, of which the norm is right to some per cent (Clarkson and Woodruff 2013).
+entries, of which the norm is right to some per cent (Clarkson and Woodruff 2013; Nelson and Nguyen
+2013).
 
 Where several groups of ranks hold the same mesh, each brings directions of its own and all of them
 take all: the basis is the same everywhere. What has to be computed for columns of the basis, or for
@@ -49,6 +50,9 @@ class Basis:
         lines: Complex frequencies [rad/s], shape ``(num_lines,)``.
         tolerance: Relative residual that every line must reach [-].
         across: Communicator of the ranks that hold the same part of the mesh.
+
+    Attributes:
+        V: The basis on this rank, in scale.
     """
 
     def __init__(
@@ -351,7 +355,7 @@ class Basis:
 
 
 def _sketch_matrix(count: int, rank: int) -> sparse.csc_matrix:
-    """Two signs a column of this rank's rows, each in a sum of its own."""
+    """Two signs over √2 a column, in two sums drawn at random (once in 600 the same one)."""
     random = np.random.default_rng([2013, rank])
     sums = random.integers(0, _SKETCH, size=(count, 2))
     signs = random.choice([-1.0, 1.0], size=(count, 2)) / np.sqrt(2.0)

@@ -20,25 +20,28 @@ class Columns:
 
     Args:
         num_rows: Rows of this rank.
+        width: Columns of a block.
     """
 
-    def __init__(self, num_rows: int) -> None:
-        self.num_rows, self.size = num_rows, 0
+    def __init__(self, num_rows: int, width: int = _WIDTH) -> None:
+        self.num_rows, self.size, self._width = num_rows, 0, width
         self._storage: list[ComplexArray] = []
 
     @property
     def blocks(self) -> list[ComplexArray]:
         """The columns there are, side by side, each shape ``(num_rows, 64 or fewer)``."""
-        widths = np.clip(self.size - _WIDTH * np.arange(len(self._storage)), 0, _WIDTH)
+        widths = np.clip(
+            self.size - self._width * np.arange(len(self._storage)), 0, self._width
+        )
         return [block[:, :width] for block, width in zip(self._storage, widths, strict=True)]
 
     def append(self, columns: ComplexArray) -> None:
         """Add columns, shape ``(num_rows, n)``."""
         while columns.shape[1]:
-            used = self.size % _WIDTH
+            used = self.size % self._width
             if not used:
-                self._storage.append(np.zeros((self.num_rows, _WIDTH), np.complex128))
-            count = min(columns.shape[1], _WIDTH - used)
+                self._storage.append(np.zeros((self.num_rows, self._width), np.complex128))
+            count = min(columns.shape[1], self._width - used)
             self._storage[-1][:, used : used + count] = columns[:, :count]
             self.size += count
             columns = columns[:, count:]
@@ -47,7 +50,7 @@ class Columns:
         """V X, X of shape ``(size,)`` or ``(size, n)``."""
         total = np.zeros((self.num_rows, *right.shape[1:]), np.complex128)
         for number, block in enumerate(self.blocks):
-            total += block @ right[_WIDTH * number : _WIDTH * number + block.shape[1]]
+            total += block @ right[self._width * number : self._width * number + block.shape[1]]
         return total
 
     def inner(self, comm: MPI.Comm, right: ComplexArray) -> ComplexArray:

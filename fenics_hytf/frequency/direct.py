@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +16,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.frequency.errors import FactorisationError, ResidualError, ResonanceError
-from fenics_hytf.frequency.groups import share, together
+from fenics_hytf.frequency.groups import share, shares, together
 from fenics_hytf.frequency.loads import Loads
 from fenics_hytf.frequency.sweep import DenseSweep
 from fenics_hytf.frequency.system import DynamicSystem
@@ -266,7 +265,6 @@ def direct_sweep(
 
 def _spread(values: ComplexArray, num_sides: int, num_lines: int, across: MPI.Comm) -> None:
     """Give every group the solutions of all, a line at a time: counts of MPI are 32 bits wide."""
-    bounds = [num_lines * group // across.size for group in range(across.size + 1)]
-    for owner, (first, stop) in enumerate(pairwise(bounds)):
-        for line in range(first, stop):
+    for owner, lines in enumerate(shares(num_lines, across)):
+        for line in range(lines.start, lines.stop):
             across.Bcast(values[:, line * num_sides : (line + 1) * num_sides], owner)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 from mpi4py import MPI
 
@@ -26,7 +27,13 @@ def share(count: int, across: MPI.Comm) -> slice:
     Returns:
         Their numbers.
     """
-    return slice(*(count * group // across.size for group in (across.rank, across.rank + 1)))
+    return shares(count, across)[across.rank]
+
+
+def shares(count: int, across: MPI.Comm) -> list[slice]:
+    """The shares of all groups; see :func:`share`."""
+    bounds = (count * group // across.size for group in range(across.size + 1))
+    return [slice(*pair) for pair in pairwise(bounds)]
 
 
 @contextmanager

@@ -25,7 +25,7 @@ ComplexArray = npt.NDArray[np.complex128]
 
 _CIRCLE = 0.3  # radius of the circle round an expansion point, over its distance from the real axis
 _NODES = 16  # on the circle: a function that is regular within three times it is exact to 1e-8
-_NOTHING = 1e-12  # of the largest coefficient
+_NOTHING = 1e-12  # of a vector: what the directions before leave of it is round-off
 
 
 def taylor(function: ScalarFunction, s: complex, order: int, radius: float) -> ComplexArray:
@@ -93,12 +93,16 @@ def krylov_block(
         state = np.zeros((order, steps), np.complex128)
         state[0, :k], state[0, k] = overlap, length
         state[1:] = states[k - 1, : order - 1]
-        for _ in range(2):
-            state -= np.einsum(
-                "l,lij->ij", np.einsum("lij,ij->l", states[:k].conj(), state), states[:k]
-            )
-        states[k] = state / np.linalg.norm(state)
+        states[k] = _beside_states(states[:k], state)
     return Q
+
+
+def _beside_states(states: ComplexArray, state: ComplexArray) -> ComplexArray:
+    """A state at right angles to orthonormal ones, shape ``(k, order, steps)``, of norm one."""
+    for _ in range(2):
+        overlap = np.einsum("lij,ij->l", states.conj(), state)
+        state = state - np.einsum("l,lij->ij", overlap, states)
+    return np.asarray(state / np.linalg.norm(state))
 
 
 def _against(comm: MPI.Comm, Q: ComplexArray, w: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

@@ -32,6 +32,38 @@ class Loads(Protocol):
 
 
 @dataclass(frozen=True)
+class AffineLoads:
+    """Right-hand sides that are sums of a few vectors times known functions of s.
+
+    Attributes:
+        vectors: Borrowed from whoever made them.
+        coefficients: Of each vector in each side of each line, shape
+            ``(len(vectors), num_sides, num_lines)``.
+    """
+
+    vectors: Sequence[PETSc.Vec]
+    coefficients: ComplexArray
+
+    def __len__(self) -> int:
+        """Sides of a line."""
+        return int(self.coefficients.shape[1])
+
+    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
+        """Those of a line, made anew."""
+        sides = []
+        for side in range(len(self)):
+            total = self.vectors[0].duplicate()
+            total.zeroEntries()
+            for vector, factor in zip(
+                self.vectors, self.coefficients[:, side, line], strict=True
+            ):
+                if factor:
+                    total.axpy(factor, vector)
+            sides.append(total)
+        return sides
+
+
+@dataclass(frozen=True)
 class LoadFactors:
     """b of every line and side as combinations of a few vectors.
 
@@ -46,11 +78,11 @@ class LoadFactors:
     norms: npt.NDArray[np.float64]
 
     def at(self, line: int) -> ComplexArray:
-        """B of a line on this rank, shape ``(num_local, num_sides)``."""
+        """Loads of a line on this rank, shape ``(num_local, num_sides)``."""
         return self.vectors @ self.coordinates[:, :, line]
 
     def slope(self, line: int) -> ComplexArray:
-        """Change of b from line to line, likewise; nought where all lines are alike."""
+        """Change of the loads from line to line, likewise; nought where all lines are alike."""
         c = self.coordinates
         before, after = max(line - 1, 0), min(line + 1, c.shape[2] - 1)
         return self.vectors @ (c[:, :, after] - c[:, :, before])
@@ -79,6 +111,8 @@ def factor_loads(
     Returns:
         The factors.
     """
+    if isinstance(b, AffineLoads):
+        return _weighed(b, comm)
     if callable(b):
         return _gathered(b, num_lines, num_local, comm, tolerance)
     sides = [b] if isinstance(b, PETSc.Vec) else list(b)
@@ -86,6 +120,18 @@ def factor_loads(
     every = np.broadcast_to(np.eye(len(sides))[:, :, None], (len(sides), len(sides), num_lines))
     norms = np.broadcast_to([side.norm() or 1.0 for side in sides], (num_lines, len(sides)))
     return LoadFactors(vectors.astype(np.complex128), every.astype(np.complex128), norms)
+
+
+def _weighed(loads: AffineLoads, comm: MPI.Comm) -> LoadFactors:
+    """The vectors as they are; norms from an orthonormal basis of them."""
+    vectors = np.stack([vector.array_r for vector in loads.vectors], axis=1).astype(np.complex128)
+    # Of unit length: the small ones must not drown in the round-off of the large.
+    length = np.array([norm(comm, vector) or 1.0 for vector in vectors.T])
+    vectors, c = vectors / length, loads.coefficients * length[:, None, None]
+    power, directions = np.linalg.eigh(inner(comm, vectors, vectors))
+    root = np.sqrt(np.maximum(power, 0.0))[:, None] * directions.conj().T
+    norms = np.linalg.norm(np.tensordot(root, c, axes=1), axis=0).T
+    return LoadFactors(vectors, c, np.where(norms > 0, norms, 1.0))
 
 
 def _gathered(

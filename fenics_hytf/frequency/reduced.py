@@ -35,7 +35,7 @@ Lines = npt.NDArray[np.intp]
 _MARGIN = 0.8  # sketched residuals, right to 4 %, stay below this fraction of the tolerance
 _STRIDE = 4  # lines of the first check: every fourth
 _DROP = 1e-8  # directions that a block has in common with the basis but for this are dropped
-_ROUND_OFF = 1e-14  # all of a solution is kept: what it holds of stiff directions may be small
+_DROP_OF_SOLUTION = 1e-14  # round-off alone: its share of stiff directions may be small
 _WORST = 5  # lines whose true residual is taken at the end
 _LOAD_ERROR = 1e-3  # of the tolerance: what may be left of a load that differs between lines
 _SINGLE = 1e-7  # responses of sweeps with a looser tolerance are in single precision
@@ -82,6 +82,11 @@ class ReducedSweep:
         y = np.einsum("rsk,sk->rk", self.coordinates, weights).astype(self.precision)
         # Rows take differences of neighbours, so they meet the basis in double precision.
         return lambda rows: self.basis.seen_by(rows).astype(self.precision) @ y
+
+    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+        """On the basis; see :class:`Sweep`."""
+        y = np.einsum("rsk,sk->rk", self.coordinates, weights)
+        return np.concatenate(self.basis.blocks, axis=1), y
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""
@@ -197,6 +202,7 @@ class _Growth:
         self.expansions += [line for line, _ in wanted]
 
     def _solve_line(self, line: int) -> ComplexArray:
+        """Factorise at a line; its solutions, shape ``(num_local, num_sides)``."""
         self._factorisation.factorise(complex(self._lines[line]))
         return np.stack([self._solve(b, check=True) for b in self._loads.at(line).T], axis=1)
 
@@ -207,7 +213,7 @@ class _Growth:
         s, comm = complex(self._lines[line]), self._products.comm
         found = []
         for x in solved.T:
-            found.append((x[:, None] / (norm(comm, x) or 1.0), _ROUND_OFF))
+            found.append((x[:, None] / (norm(comm, x) or 1.0), _DROP_OF_SOLUTION))
             found.append((krylov_block(self._products, self._solve, x, s, size), _DROP))
         for slope in self._loads.slope(line).T:
             if comm.allreduce(bool(np.any(slope)), MPI.LOR):
@@ -241,6 +247,7 @@ class _Growth:
             self._require_no_resonance()
 
     def _judge(self, lines: Lines) -> None:
+        """Residuals of some lines as the sketch sees them; which of all are pending then."""
         mine = lines[share(len(lines), self._across)]
         with together(self._across):
             y = self._basis.coordinates(mine)
@@ -255,6 +262,7 @@ class _Growth:
         self._sift()
 
     def _sift(self, fraction: float = _MARGIN) -> None:
+        """Find the pending lines: those above this fraction of the tolerance."""
         above = self.residuals[self._checked].max(axis=1, initial=0.0) > fraction * self._tolerance
         self.pending = self._checked[above]
 

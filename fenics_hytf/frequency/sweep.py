@@ -61,6 +61,17 @@ class Sweep(Protocol):
             the sweep lets nothing finer through.
         """
 
+    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+        """All lines of the weighed response on few directions.
+
+        Args:
+            weights: Of each right-hand side at each line, shape ``(num_sides, num_lines)``.
+
+        Returns:
+            Directions on this rank, shape ``(num_local, n)``, or ``None`` for the unknowns
+            themselves; and coordinates, shape ``(n, num_lines)``.
+        """
+
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights.
 
@@ -122,6 +133,55 @@ class DenseSweep:
         """Weigh all right-hand sides together; see :class:`Sweep`."""
         return lambda rows: np.einsum("rsk,sk->rk", self.project(rows), weights)
 
+    def on_directions(self, weights: ComplexArray) -> tuple[None, ComplexArray]:
+        """The response at the unknowns themselves; see :class:`Sweep`."""
+        by_line = self._values.reshape(len(self._values), len(self.s), self._sides)
+        return None, np.einsum("nks,sk->nk", by_line, weights)
+
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""
         return self._values @ np.ascontiguousarray(weights.T).ravel()
+
+
+class JoinedSweep:
+    """Sweeps of one system over the same lines, as one: side after side.
+
+    Args:
+        parts: The sweeps.
+    """
+
+    def __init__(self, *parts: Sweep) -> None:
+        self._parts = parts
+        self.s = parts[0].s
+        self.residuals = np.concatenate([part.residuals for part in parts], axis=1)
+        self.factorisations = sum(part.factorisations for part in parts)
+        self.solves = sum(part.solves for part in parts)
+        self._splits = np.cumsum([part.residuals.shape[1] for part in parts])[:-1]
+
+    def solution(self, k: int) -> ComplexArray:
+        """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
+        return np.concatenate([part.solution(k) for part in self._parts], axis=1)
+
+    def project(self, rows: PETSc.Mat) -> ComplexArray:
+        """Multiply every solution by a matrix; see :class:`Sweep`."""
+        return np.concatenate([part.project(rows) for part in self._parts], axis=1)
+
+    def response(self, weights: ComplexArray) -> Response:
+        """Weigh all right-hand sides together; see :class:`Sweep`."""
+        shares = np.split(weights, self._splits)
+        responses = [p.response(w) for p, w in zip(self._parts, shares, strict=True)]
+        return lambda rows: np.asarray(sum(response(rows) for response in responses))
+
+    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+        """On the directions of all parts; see :class:`Sweep`."""
+        shares = np.split(weights, self._splits)
+        found = [p.on_directions(w) for p, w in zip(self._parts, shares, strict=True)]
+        directions = [V for V, _ in found if V is not None]
+        if len(directions) < len(found):
+            return None, np.asarray(sum(y for _, y in found))
+        return np.concatenate(directions, axis=1), np.concatenate([y for _, y in found])
+
+    def combine(self, weights: ComplexArray) -> ComplexArray:
+        """Sum all solutions with weights; see :class:`Sweep`."""
+        shares = np.split(weights, self._splits)
+        return np.asarray(sum(p.combine(w) for p, w in zip(self._parts, shares, strict=True)))

@@ -136,6 +136,11 @@ def closed_form(scene: Scene) -> RealArray:
 
 def _check(scene: Scene) -> None:
     """Raise NoClosedForm unless the scene is linear, level and between sides that move alike."""
+    if scene.lapses.continuity == "transient":
+        raise NoClosedForm("its response is transient, not periodic")
+    if scene.solver.complex_modulus == "maxwell":
+        raise NoClosedForm("its complex modulus is maxwell, which hangs on frequency")
+    # Only points that move carry a stress: without convection geometric stiffness is nought.
     effects = [name for name in scene.effects.named if name != "geometric_stiffness"]
     if effects:
         raise NoClosedForm(f"it calls for {' and '.join(effects)}")

@@ -20,12 +20,14 @@ import numpy.typing as npt
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.study import time_domain
 from fenics_hytf.study.closed_form import NoClosedForm, closed_form
-from fenics_hytf.study.knobs import KNOBS, Knobs, Setting, text_of
+from fenics_hytf.study.knobs import KNOBS, MESH, Knobs, Setting, text_of
 from fenics_hytf.study.measures import Error, Yardstick
 from fenics_hytf.study.plan import FINE, FINEST, OTHER_SWEEP, Costs, affordable, left_out
-from fenics_hytf.study.prediction import MESH, Forecast, Prediction
+from fenics_hytf.study.prediction import Forecast, Prediction
 from fenics_hytf.study.records import (
+    SAME,
     TARGETS,
+    WORTH,
     BudgetSpent,
     Point,
     Reference,
@@ -44,14 +46,12 @@ RealArray = npt.NDArray[np.float64]
 
 logger = logging.getLogger(__name__)
 
-_PATIENCE = 120.0  # s of wall time that any run may take
-_LONGEST = 40.0  # runs of the scene itself that any other may take
+_PATIENCE = 120.0  # s of wall time that any run may take,
+_LONGEST = 40.0  # or so many times what the scene itself takes, where that is more
 _USUAL = 45  # runs of a study, before more is known
 _TRIES = 4  # settings run for one target
-_SAME = 1.1  # an error that is so much larger is called the same
 _NOTHING = 1e-9  # relative L2: rounding
-_OFF = 10.0  # times its tolerance, what a reduced sweep may be off by
-_WORTH = 0.9  # of the cost: less is worth saying
+_OFF = 10.0  # times its tolerance, what the response of a reduced sweep may be off by
 
 
 def conduct(
@@ -181,14 +181,13 @@ class _Course:
         """What a direct sweep costs over a reduced one; it is left out where it does not end."""
         own = self.knobs.own
         reduced = own if own.sweep else own.turned("sweep", OTHER_SWEEP)
-        swept = [
-            self._try_out(each, "either sweep").cost for each in (reduced, own.turned("sweep", 0.0))
-        ]
-        if swept[1] is None:
-            self.knobs.leave_out("sweep", 0.0)
-        if swept[0] is None or swept[1] is None:
+        direct = own.turned("sweep", 0.0)
+        costs = [self._try_out(each, "either sweep").cost for each in (reduced, direct)]
+        if costs[1] is None:
+            self.knobs.leave_out("sweep", direct.sweep)
+        if costs[0] is None or costs[1] is None:
             return 1.0
-        return swept[1].core_s / swept[0].core_s
+        return costs[1].core_s / costs[0].core_s
 
     def _settle_points(self) -> None:
         """Leave the points as they are where more of them, or fewer, change nothing.
@@ -201,17 +200,20 @@ class _Course:
         nothing = max(_NOTHING, _OFF * own.sweep)
         base = self._outcomes[own].response
         assert base is not None
-        measure = Yardstick(base, self._scene.dt, tuple(self._scene.output.receivers))
+        measure = self._against(base)
         for points in (fewest, most):
             response = self._try_out(own.turned("points", points), "from own").response
             if response is None or measure.distance(response, base) > nothing:
                 return
         self.knobs.settle("points")
 
+    def _against(self, response: RealArray) -> Yardstick:
+        """What measures against a response."""
+        return Yardstick(response, self._scene.dt, tuple(self._scene.output.receivers))
+
     def _refer(self, text: str, response: RealArray) -> None:
         """Measure from here on against a response."""
-        names = tuple(self._scene.output.receivers)
-        self._yardstick = Yardstick(response, self._scene.dt, names)
+        self._yardstick = self._against(response)
         self._reference = Reference(text, 0.0)
 
     def _first_that_runs(self, setting: Setting, last: Setting) -> Setting:
@@ -225,10 +227,12 @@ class _Course:
         """Settings that differ from a fine one in one knob, or in mesh size and degree."""
         values = self.knobs.values
         turned = [
-            (fine.turned("degree", degree).turned("cells", size), "cells" if same else "degree")
+            (
+                fine.turned("degree", degree).turned("cells", size),
+                "cells" if degree == fine.degree else "degree",
+            )
             for degree in values["degree"]
             if degree <= fine.degree
-            for same in [degree == fine.degree]
             for size in values.get("cells", (fine.cells,))
             if size <= fine.cells
         ]
@@ -265,15 +269,15 @@ class _Course:
                 )
                 best = cheapest(self._points(), target)
                 least = float("inf") if best is None else core_s(best)
-                if found is None or found.core_s * cost_off >= _WORTH * least:
+                if found is None or found.core_s * cost_off >= WORTH * least:
                     break
                 outcome = self._try_out(found.setting, "candidate")
                 error = self._error(found.setting)
                 if outcome.cost is None or error is None:
                     continue
                 cost_off = max(cost_off, outcome.cost.core_s / found.core_s)
-                if error.relative_l2 > found.relative_l2 * error_off:
-                    error_off = max(error_off, error.relative_l2 / found.relative_l2)
+                foretold = max(found.relative_l2, _NOTHING)
+                error_off = max(error_off, error.relative_l2 / foretold)
 
     def _promising(self, forecasts: list[Forecast], target: float) -> Forecast | None:
         """The cheapest of forecasts within a target that has not been run."""
@@ -287,16 +291,16 @@ class _Course:
         if here is None or error is None:
             return
         turned = [
-            prediction.forecast(own.turned(k, v))
-            for k in self.knobs.values
-            for v in self.knobs.values[k]
+            prediction.forecast(own.turned(knob, value))
+            for knob, values in self.knobs.values.items()
+            for value in values
         ]
         least = min(
-            (f for f in turned if f is not None and f.relative_l2 <= _SAME * here.relative_l2),
+            (f for f in turned if f is not None and f.relative_l2 <= SAME * here.relative_l2),
             key=lambda forecast: forecast.core_s,
             default=here,
         )
-        if least.core_s < _WORTH * here.core_s:
+        if least.core_s < WORTH * here.core_s:
             self._try_out(least.setting, "from own")
 
     def _error(self, setting: Setting) -> Error | None:

@@ -19,7 +19,7 @@ from fenics_hytf.results.figures.style import (
     label,
     save,
 )
-from fenics_hytf.study.knobs import LABELS
+from fenics_hytf.study.knobs import LABELS, MESH
 from fenics_hytf.study.records import (
     TARGETS,
     Comparison,
@@ -43,6 +43,7 @@ _METHODS = {
 _FLOOR = 1e-10  # %: rounding; smaller errors are drawn there
 _TWIN_FLOOR = 1e-4  # %: smaller differences from the direct sweep are drawn there
 _BESIDE = {"newmark": (-11, -12), "hht": (6, 4)}  # where steps are named
+_BELOW_DOUBT = 0.1  # of the reference's uncertainty: smaller errors are drawn there
 _SHORT = 200.0  # an axis from low to high that spans less has numbers within decades too
 _ROOM = 3.0  # below the smallest error drawn, and above the largest
 
@@ -87,8 +88,9 @@ def _scene(axes: Axes, study: Study) -> None:
         mine = [p for p in study.points if knob in p.families]
         if len(measured(mine)) > 1:
             colour, marker = _KNOBS[knob]
-            pair = mine[0].words["degree"] if knob in ("cells", "degree") else "alone"
-            name = f"mesh size, {pair}" if knob in ("cells", "degree") else f"{text} {pair}"
+            # Both families of the mesh are sizes, each at a degree of its own.
+            mesh = f"{LABELS['cells']}, {mine[0].words['degree']}"
+            name = mesh if knob in MESH else f"{text} alone"
             _series(axes, mine, colour, marker, name, floor)
     rays = False
     for point in measured(study.points):
@@ -102,35 +104,46 @@ def _scene(axes: Axes, study: Study) -> None:
     _series(axes, tried, INK, "h", "sought for a target", floor, joined=False)
     _front(axes, study.points, floor)
     if study.own != study.finest:
-        axes.plot(
-            *_place(study.own, floor),
-            marker="*",
-            color=INK,
-            markersize=15,
-            markerfacecolor="white",
-            linestyle="none",
-            label="the scene as it is",
-            zorder=6,
-        )
+        _star(axes, study.own, floor)
+    if study.reference.uncertainty > 0:
+        _doubt(axes, study)
+    reference = study.reference.text.split(":")[0].split(" (")[0]  # without the details
+    _dress(axes, f"Error against the {reference}", floor)
+
+
+def _star(axes: Axes, own: Point, floor: float) -> None:
+    """The scene as it is."""
+    axes.plot(
+        *_place(own, floor),
+        marker="*",
+        color=INK,
+        markersize=15,
+        markerfacecolor="white",
+        linestyle="none",
+        label="the scene as it is",
+        zorder=6,
+    )
+
+
+def _doubt(axes: Axes, study: Study) -> None:
+    """The errors that the reference cannot tell."""
     doubt = 100 * study.reference.uncertainty
-    if doubt > 0:
-        if any(not point.resolved for point in measured(study.points)):
-            text = "hollow: within the uncertainty"
-            axes.plot(
-                [], [], color=INK, marker="o", markerfacecolor="white", linestyle="none", label=text
-            )
-        axes.axhspan(0.0, doubt, color=QUIET, alpha=0.15, linewidth=0)
-        axes.annotate(
-            "uncertainty of the reference",
-            (0.01, doubt),
-            xycoords=("axes fraction", "data"),
-            xytext=(0, -3),
-            textcoords="offset points",
-            va="top",
-            color=QUIET,
-            fontsize=8.5,
+    if any(not point.resolved for point in measured(study.points)):
+        text = "hollow: within the uncertainty"
+        axes.plot(
+            [], [], color=INK, marker="o", markerfacecolor="white", linestyle="none", label=text
         )
-    _dress(axes, f"Error against the {study.reference.text.split(':')[0].split(' (')[0]}", floor)
+    axes.axhspan(0.0, doubt, color=QUIET, alpha=0.15, linewidth=0)
+    axes.annotate(
+        "uncertainty of the reference",
+        (0.01, doubt),
+        xycoords=("axes fraction", "data"),
+        xytext=(0, -3),
+        textcoords="offset points",
+        va="top",
+        color=QUIET,
+        fontsize=8.5,
+    )
 
 
 def _ray(axes: Axes, own: Point, point: Point, floor: float) -> None:
@@ -237,7 +250,7 @@ def _lowest(points: Iterable[Point], doubt: float) -> float:
     """Smallest error that is drawn [%]: rounding, or well below what the reference is good for."""
     errors = [100 * p.error.relative_l2 for p in points if p.error]
     least = min((e for e in errors if e > _FLOOR), default=_FLOOR)
-    return max(min(least, 100 * doubt) if doubt else least, 100 * doubt / 10, _FLOOR)
+    return max(min(least, 100 * doubt) if doubt else least, _BELOW_DOUBT * 100 * doubt, _FLOOR)
 
 
 def _dress(axes: Axes, title: str, floor: float) -> None:

@@ -27,7 +27,7 @@ _LAPSES = (1, 2, 4)
 _LOOPS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
 _FEWEST_SAMPLES = 32  # a lapse
 _NO_TAIL = 1e-6  # of the record, in the norm: what a wider band may add without being another
-_PATIENCE = 200  # iterations of a loop that is to change less than the scene asks for
+_ITERATIONS = 200  # at least, of a loop that is to change less than the scene asks for
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,9 @@ class Setting:
 
 KNOBS = tuple(field.name for field in fields(Setting))
 
+MESH = ("cells", "degree")
+"""Knobs of the mesh, which do not act one by one."""
+
 LABELS = {
     "cells": "mesh size",
     "degree": "degree",
@@ -82,6 +85,8 @@ class Knobs:
         cell_type: Of its mesh, ``quadrilateral`` and the like.
 
     Attributes:
+        scene: The scene.
+        nyquist: The widest band [Hz].
         own: The scene's own setting.
         values: Values of each knob that the scene has, from coarse to fine.
         notes: What is left out, and why.
@@ -143,6 +148,7 @@ class Knobs:
                 changes["lapses", "duration"] = samples * self.scene.dt
             else:
                 changes["lapses", "count"] = setting.lapses
+            changes |= self._kept()
         if "loop" in turned:
             changes |= self._looped(setting.loop)
         return changes
@@ -205,6 +211,12 @@ class Knobs:
         values = self.values[knob]
         return values if knob == "lapses" else values[: values.index(getattr(setting, knob)) + 1]
 
+    def lines_up_to(self, band: float) -> int:
+        """Lines of the record, in one piece, that carry energy up to a frequency [Hz]."""
+        spectra = to_frequency(self.scene.base_acceleration)
+        excited = self.scene.solver.excited
+        return len(excited_lines(spectra, self.scene.dt, self._total, excited, band))
+
     def leave_out(self, knob: str, value: float) -> None:
         """Take a value of a knob away, because it takes too long or fails."""
         self.notes.append(
@@ -242,6 +254,7 @@ class Knobs:
 
     @property
     def _total(self) -> int:
+        """Samples of the record with what pads its last lapse."""
         return self.scene.segments[-1].stop
 
     def _allowed(self, degree: int) -> tuple[int, ...]:
@@ -257,12 +270,22 @@ class Knobs:
             return [1.0]
         found: dict[tuple[Any, ...], float] = {}
         for factor in (1.0, *_CELLS):  # the scene's own first: it stays where others are the same
-            if factor != 1.0:
-                counts = tuple(_flat(self._refined(factor)))
-            else:
-                counts = tuple(_flat(self._counts()))
+            counts = tuple(_flat(self._refined(factor)))
             found.setdefault(counts, factor)
         return sorted(found.values())
+
+    def _kept(self) -> Overrides:
+        """What hangs on the number of lapses where the file does not name it, as the scene has it.
+
+        Another number of lapses is not to be another law.
+        """
+        lapses, solver = self.scene.lapses, self.scene.solver
+        kept = {
+            ("lapses", "continuity"): lapses.continuity,
+            ("solver", "complex_modulus"): solver.complex_modulus,
+        }
+        data = self.scene.data
+        return {(a, b): value for (a, b), value in kept.items() if b not in data.get(a, {})}
 
     def _looped(self, tolerance: float) -> Overrides:
         """Another tolerance of the loop, with the iterations that a smaller one takes."""
@@ -270,8 +293,8 @@ class Knobs:
         loop = self.scene.effects.equivalent_linear
         assert loop is not None
         table: dict[str, Any] = {"tolerance": tolerance}
-        if tolerance < self.own.loop and loop.max_iterations < _PATIENCE:
-            table["max_iterations"] = _PATIENCE
+        if tolerance < self.own.loop and loop.max_iterations < _ITERATIONS:
+            table["max_iterations"] = _ITERATIONS
         if not isinstance(self.scene.data["effects"]["equivalent_linear"], dict):
             return {path: table}
         return {(*path, name): value for name, value in table.items()}
@@ -294,13 +317,7 @@ class Knobs:
 
         return {path: times(count) for path, count in self._counts().items()}
 
-    def lines_up_to(self, band: float) -> int:
-        """Lines of the record, in one piece, that carry energy up to a frequency [Hz]."""
-        spectra = to_frequency(self.scene.base_acceleration)
-        excited = self.scene.solver.excited
-        return len(excited_lines(spectra, self.scene.dt, self._total, excited, band))
-
-    def tail(self, band: float) -> float:
+    def _tail(self, band: float) -> float:
         """Share of the record above a frequency, in the norm [-]."""
         spectra = np.abs(to_frequency(self.scene.base_acceleration)) ** 2
         above = frequencies(self._total, self.scene.dt) > band * (1 + 1e-12)
@@ -312,7 +329,7 @@ class Knobs:
         bands = sorted({min(own * factor, self.nyquist) for factor in _BANDS} | {self.nyquist})
         kept: list[float] = []
         for band in bands:
-            same = bool(kept) and self.tail(kept[-1]) - self.tail(band) <= _NO_TAIL
+            same = bool(kept) and self._tail(kept[-1]) - self._tail(band) <= _NO_TAIL
             if same and band == own:
                 kept[-1] = own
             elif band == own or (not same and self.lines_up_to(band)):

@@ -20,8 +20,8 @@ from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import DynamicSystem, ScalarFunction
 from fenics_hytf.lapse import (
     Equations,
-    complex_constants,
     first_strain,
+    material,
     seed_points,
     survey,
 )
@@ -34,7 +34,7 @@ from fenics_hytf.simulation.receivers import Receivers
 RealArray = npt.NDArray[np.float64]
 
 _PROBES = np.array([1j, 2.0 + 3.0j])  # complex frequencies at which powers of s differ
-_LAWS = {
+_LAWS = {  # what each kind of matrix is multiplied by there
     "stiffness": np.ones(2),
     "hysteresis": np.full(2, 1j),
     "damping": _PROBES,
@@ -103,8 +103,7 @@ def assemble(scene: Scene) -> Matrices:
         equations.weigh(points)
         ground = survey(scene, domain, points)
         moduli = ground.secant(first_strain(scene, ground))
-        parts = complex_constants(ground, moduli, scene.solver.complex_modulus, scene.solver.keep)
-        lapse = equations.assemble(ground, *parts)
+        lapse = equations.assemble(ground, material(ground, moduli, scene.solver))
         matrices = _sorted(lapse.system)
         assert isinstance(lapse.loads, list)  # else they are the free field's
         loads = lapse.loads
@@ -148,6 +147,7 @@ def _law(function: ScalarFunction) -> str:
 
 
 def _real(matrix: PETSc.Mat) -> sparse.csr_matrix:
+    """A serial real matrix in the common pattern, zeros and all."""
     start, columns, values = matrix.getValuesCSR()
     return sparse.csr_matrix((values.real.copy(), columns, start), shape=matrix.getSize())
 

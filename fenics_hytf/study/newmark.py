@@ -301,9 +301,9 @@ class Marcher:
             found[0] = rows @ state[2]
             forces = np.ascontiguousarray(forces.T)
             if self._small:
-                _march(system, self._ldl, watched, numbers, loads, forces, state, found)
+                _march_small(system, self._ldl, watched, numbers, loads, forces, state, found)
             else:
-                self._march(system, watched, numbers, loads, forces, state, found)
+                self._march_large(system, watched, numbers, loads, forces, state, found)
         self.cost.steps += len(forces)
         return found.T
 
@@ -314,7 +314,7 @@ class Marcher:
         with self.cost.phase("factorise"):
             return np.asarray(self._factorise(self._M).solve(force))
 
-    def _march(
+    def _march_large(
         self,
         system: tuple[RealArray, ...],
         watched: tuple[RealArray, ...],
@@ -388,8 +388,8 @@ def _solve(ldl, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _march(system, ldl, watched, numbers, loads, forces, state, found):  # type: ignore[no-untyped-def]
-    """All steps."""
+def _march_small(system, ldl, watched, numbers, loads, forces, state, found):  # type: ignore[no-untyped-def]
+    """All steps of a system whose L fits the cache."""
     right, work = np.empty_like(state[0]), (np.empty_like(state[0]), np.empty_like(state[0]))
     for number in range(len(forces)):
         _set_up(system, numbers, loads, forces[number], state, work, right)

@@ -2,8 +2,8 @@
 """What a study can afford: how fine its finest runs are, before they are run.
 
 Costs are extrapolated from the scene's own run with exponents of nested dissection: a factorisation
-takes n^1.5 operations in 2D and n^2 in 3D, a column n; what is not factorised grows like n, so the
-exponents lie in between.
+takes n^1.5 operations in 2D and n^2 in 3D, and one of a column n; what is not factorised grows like
+n, or, in a small system, less. The exponents lie in between.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import math
 
 from fenics_hytf.study.knobs import LABELS, Knobs, Setting
 
-_EXPONENTS = {1: 0.9, 2: 1.2, 3: 1.6}
+_EXPONENTS = {1: 0.9, 2: 1.2, 3: 1.6}  # of n, by the number of directions that are refined
 _REDUCED_LINES = 0.5  # exponent of the number of lines: more of them share a factorisation
 # which gives way first, a value at a time; then each as far as the scene's own value
 _ORDER = ("sweep", "cells", "band", "loop", "sweep", "cells", "degree")
@@ -105,6 +105,6 @@ def _coarser(knobs: Knobs, setting: Setting, knob: str) -> Setting | None:
         return None
     index = values.index(here)
     own = values.index(getattr(knobs.own, knob))
-    if knob == "sweep":
-        own = min(own, len(values) - 2)  # a reduced sweep is at hand where the own one is direct
+    if knob == "sweep" and not knobs.own.sweep:
+        own -= 1  # where the scene's own is direct, a reduced one will do
     return setting.turned(knob, values[index - 1]) if index > own else None

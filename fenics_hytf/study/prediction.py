@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.study.knobs import KNOBS, Setting
+from fenics_hytf.study.knobs import KNOBS, MESH, Setting
 from fenics_hytf.study.measures import Yardstick
 from fenics_hytf.study.runs import Outcome
 
 RealArray = npt.NDArray[np.float64]
 
-MESH = ("cells", "degree")
 GROUPS = (MESH, *((knob,) for knob in KNOBS if knob not in MESH))
 """Knobs that are turned together."""
 
@@ -32,7 +31,7 @@ class Forecast:
 
     Attributes:
         setting: The setting.
-        core_s: [s].
+        core_s: Cost [s].
         relative_l2: Of the worst receiver [-].
     """
 

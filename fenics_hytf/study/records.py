@@ -13,9 +13,16 @@ from fenics_hytf.study.runs import Cost
 TARGETS = (0.05, 0.01, 0.001)
 """Errors that a cheapest setting is sought for, relative L2 [-]."""
 
-_LESS, _MUCH_LESS = 0.99, 0.9
 RESOLVED = 3.0
 """Times the reference's own uncertainty: a smaller error is not told from it."""
+
+SAME = 1.1
+"""Errors within this ratio are called the same."""
+
+WORTH = 0.9
+"""A cost below this ratio is worth having."""
+
+_LESS, _MUCH_LESS = 0.99, 0.9  # ratios of errors in a front; see :func:`pareto`
 
 
 @dataclass(frozen=True)
@@ -25,14 +32,15 @@ class Point:
     Attributes:
         name: Setting in words.
         families: Why it was run: the knobs turned alone from the fine setting that it shows;
-            ``own``, ``from own``, ``fine``, ``sweep`` or ``candidate``; of the twin, the method.
+            ``own``, ``either sweep``, ``fine``, ``from own`` or ``candidate``; of the twin, the
+            method.
         overrides: What it changes in the scene, as after ``--set``.
         cost: ``None`` if it failed.
         error: ``None`` if it failed.
         failure: Why it failed.
         doubt: What the reference is uncertain by, relative L2 [-].
         turned: Knobs that differ from the scene's own.
-        values: Value of each knob that the scene has.
+        values: Value of each knob.
         words: The same in words.
         substeps: Time steps per sample, of a march.
     """

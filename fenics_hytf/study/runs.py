@@ -31,7 +31,10 @@ from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
 
-_SOLVING = (
+JOB, RESPONSE, COST, FAILURE = "job.json", "response.npy", "cost.json", "failure"
+"""Files in the folder of a run: what is to be done, and what the process that does it leaves."""
+
+_ROOMS = (  # that a run solves with, as :func:`_code` looks at them
     "motion",
     "soil",
     "scene",
@@ -42,8 +45,8 @@ _SOLVING = (
     "lapse",
     "simulation",
 )
-_WORKER = ("worker.py",)
-_MARCHING = ("newmark.py", "matrices.py")
+_SHARED = ("_compat.py", "study/worker.py")
+_MARCHING = ("study/newmark.py", "study/matrices.py")
 _ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 
@@ -147,18 +150,19 @@ class Processes:
 
     def __call__(self, job: Job, limit: float | None = None) -> Outcome:
         """See :class:`Runner`."""
-        found = self._find(job.key)
+        key = job.key
+        found = self._find(key)
         if found is not None:
             return found
         self._before()
         with tempfile.TemporaryDirectory(dir=self._folder, prefix=".run-") as name:
             place = Path(name)
-            write_job(place / "job.json", job)
+            write_job(place / JOB, job)
             failure = _execute(place, limit)
             if not failure:
-                (place / "response.npy").replace(self._folder / f"{job.key}.npy")
-                replace_file(self._folder / f"{job.key}.json", (place / "cost.json").read_text())
-        return Outcome(None, None, failure) if failure else self._read(job.key, kept=False)
+                (place / RESPONSE).replace(self._folder / f"{key}.npy")
+                replace_file(self._folder / f"{key}.json", (place / COST).read_text())
+        return Outcome(None, None, failure) if failure else self._read(key, kept=False)
 
     def _find(self, key: str) -> Outcome | None:
         try:
@@ -189,10 +193,9 @@ def read_job(path: Path) -> Job:
     return Job(scene, record["method"], record["substeps"])
 
 
-def write_outcome(folder: Path, cost: Cost, response: RealArray) -> None:
-    """Write what a process has found."""
-    np.save(folder / "response.npy", response)
-    (folder / "cost.json").write_text(json.dumps(asdict(cost)))
+def write_cost(path: Path, cost: Cost) -> None:
+    """Write what a run has cost."""
+    path.write_text(json.dumps(asdict(cost)))
 
 
 def _execute(place: Path, limit: float | None) -> str:
@@ -219,9 +222,8 @@ def _execute(place: Path, limit: float | None) -> str:
                 process.wait()
         if code == 0:
             return ""
-        failure = place / "failure"
-        if failure.exists():
-            return failure.read_text()
+        if (place / FAILURE).exists():
+            return (place / FAILURE).read_text()
         said.seek(0)
         last = [line.strip() for line in said if line.strip()][-1:]
         how = f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"
@@ -233,8 +235,8 @@ def _code(method: str) -> str:
     """Hash of the code that an outcome of a method depends on."""
     digest = hashlib.sha256()
     package = Path(fenics_hytf.__file__).resolve().parent
-    files = [file for room in _SOLVING for file in sorted((package / room).glob("*.py"))]
-    names = _WORKER if method == "simulate" else _WORKER + _MARCHING
-    for file in files + [package / "study" / name for name in names]:
+    files = [file for room in _ROOMS for file in sorted((package / room).glob("*.py"))]
+    names = _SHARED if method == "simulate" else _SHARED + _MARCHING
+    for file in files + [package / name for name in names]:
         digest.update(file.read_bytes())
     return digest.hexdigest()

@@ -17,13 +17,14 @@ from typing import Any
 
 from fenics_hytf.results.folder import replace_file
 from fenics_hytf.results.summary import own_version
-from fenics_hytf.study.knobs import LABELS
+from fenics_hytf.study.knobs import LABELS, MESH
 from fenics_hytf.study.records import Point, Study, core_s, pareto
 from fenics_hytf.study.verdict import percent
 
 TABLE, RECORD, FIGURE = "accuracy.csv", "accuracy.json", "accuracy.png"
 
 _MIB = 2**20
+_READ = ("error", "ln PSA", "core-s", "factorisations", "MiB")  # columns of what a person reads
 _COLUMNS = (
     "problem",
     "setting",
@@ -80,8 +81,7 @@ def table(study: Study) -> str:
     rows += [_heading(""), _row(study.own, "the scene as it is")]
     if study.finest is not None:
         rows.append(_row(study.finest, f"reference: {study.finest.name}"))
-    head = ("", "error", "ln PSA", "core-s", "factorisations", "MiB")
-    return _aligned([head, *rows])
+    return _aligned([("", *_READ), *rows])
 
 
 def twin_table(study: Study) -> str:
@@ -89,21 +89,18 @@ def twin_table(study: Study) -> str:
     if not study.twin.points:
         return ""
     front = pareto(study.twin.points)
-    rows: list[tuple[str, ...]] = [
-        ("viscous twin", "error", "ln PSA", "core-s", "factorisations", "MiB")
-    ]
-    rows += [_row(p, p.name, "*" if p in front else " ") for p in study.twin.points]
-    return _aligned(rows)
+    rows = [_row(p, p.name, "*" if p in front else " ") for p in study.twin.points]
+    return _aligned([("viscous twin", *_READ), *rows])
 
 
 def _heading(text: str) -> tuple[str, ...]:
-    return (text, *[""] * 5)
+    return (text, *[""] * len(_READ))
 
 
 def _alone(point: Point, knob: str) -> str:
     """The value of a knob; mesh size and degree belong together."""
-    pair = ("cells", "degree") if knob in ("cells", "degree") else (knob,)
-    return ", ".join(point.words[name] for name in pair)
+    names = MESH if knob in MESH else (knob,)
+    return ", ".join(point.words[name] for name in names)
 
 
 def _row(point: Point, name: str, mark: str = " ") -> tuple[str, ...]:

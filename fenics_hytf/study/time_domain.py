@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.study.measures import Yardstick
 from fenics_hytf.study.records import Comparison, Point, Reference
 from fenics_hytf.study.runs import Job, Outcome
+from fenics_hytf.study.twin import viscous_twin
 
 RealArray = npt.NDArray[np.float64]
 Start = Callable[[Job, str, float | None], Outcome]
@@ -31,6 +33,16 @@ PLANNED = 1 + len(TOLERANCES) + len(METHODS) * len(SUBSTEPS)
 """Runs of a comparison."""
 
 _EXACT = 1e-10  # residual of the direct sweep
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run of the twin: its method, what is told of it, steps a sample of a march, outcome."""
+
+    method: str
+    text: str
+    substeps: int
+    outcome: Outcome
 
 
 def nothing(reason: str) -> Comparison:
@@ -49,17 +61,15 @@ def compare(scene: Scene, start: Start, limit: float | None = None) -> Compariso
     Returns:
         The comparison; without points where there is no twin.
     """
-    from fenics_hytf.study.twin import viscous_twin
-
     try:
         twin = viscous_twin(scene)
     except ValueError as no:
         return nothing(str(no))
-    runs: list[tuple[str, str, int, Outcome]] = []
+    runs: list[_Run] = []
 
     def attempt(job: Job, method: str, text: str) -> Outcome:
         outcome = start(job, f"viscous twin: {text}", limit)
-        runs.append((method, text, job.substeps if method in METHODS else 0, outcome))
+        runs.append(_Run(method, text, job.substeps if method in METHODS else 0, outcome))
         return outcome
 
     exact = attempt(Job(_swept(twin, "direct", _EXACT)), "direct", SWEEPS["direct"])
@@ -86,17 +96,18 @@ def _swept(twin: Scene, sweep: str, tolerance: float) -> Scene:
     return Scene.from_dict(data, twin.folder)
 
 
-def _reference(runs: list[tuple[str, str, int, Outcome]], yardstick: Yardstick) -> Reference:
+def _reference(runs: list[_Run], yardstick: Yardstick) -> Reference:
     """The direct sweep; how far marches, whose error falls with the square of a step, are."""
     marched = {
-        substeps: yardstick.fitted(outcome.response)
-        for method, _, substeps, outcome in runs
-        if method == "newmark" and outcome.response is not None
+        run.substeps: yardstick.fitted(run.outcome.response)
+        for run in runs
+        if run.method == "newmark" and run.outcome.response is not None
     }
     text = "the direct sweep"
     finest = max(marched, default=0)
     if finest // 2 not in marched:
         return Reference(f"{text}, not checked by a march", 0.0)
+    # of the second order, a step half as long leaves a quarter: a third of the change is left
     extrapolated = marched[finest] + (marched[finest] - marched[finest // 2]) / 3
     apart = yardstick.distance(extrapolated, yardstick.reference)
     return Reference(
@@ -106,18 +117,18 @@ def _reference(runs: list[tuple[str, str, int, Outcome]], yardstick: Yardstick) 
     )
 
 
-def _point(run: tuple[str, str, int, Outcome], yardstick: Yardstick, reference: Reference) -> Point:
-    method, text, substeps, outcome = run
-    error = None if outcome.response is None else yardstick.error(outcome.response)
-    exact = method == "direct"
+def _point(run: _Run, yardstick: Yardstick, reference: Reference) -> Point:
+    outcome, error = run.outcome, None
+    if outcome.response is not None and run.method != "direct":  # which is what is measured against
+        error = yardstick.error(outcome.response)
     return Point(
-        name=text,
-        families=(method,),
+        name=run.text,
+        families=(run.method,),
         overrides=(),
         cost=outcome.cost,
-        error=None if exact else error,
+        error=error,
         failure=outcome.failure,
         # a reduced sweep tends to the direct one, a march to what the direct one may differ from
-        doubt=reference.uncertainty if method in METHODS else 0.0,
-        substeps=substeps,
+        doubt=reference.uncertainty if run.method in METHODS else 0.0,
+        substeps=run.substeps,
     )

@@ -9,7 +9,8 @@ stiffness (Roesset, Whitman and Dobry 1973): each soil's damping ratio by its sh
 
 The sweep's response is periodic. The twin is padded with zeros until free vibration has died out,
 and is then the response from rest as well. Of the modes that a record moves the first one dies out
-last, as e^{−ζω₁t}: for Rayleigh damping ζω grows with ω up to 1/β, which is far above.
+last, as e^{−ζω₁t}: with Rayleigh damping ζω = α/2 + βω²/2 grows with ω, and modes that are
+overdamped die out at a rate of 1/β or more, which is far above.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ SECOND = 5.0
 """The second frequency of full ζ over the first."""
 
 _SETTLED = 1e-9  # change of ω₁² from one inverse iteration to the next
-_ITERATIONS = 50  # of modes that are still mixed then, frequencies differ by a few per cent
+_ITERATIONS = 50  # modes that are still mixed after so many are a few per cent apart
 _LONGEST = 1000.0  # records: a twin that rings on for longer is no use to a comparison
 
 
@@ -71,7 +72,7 @@ def viscous_twin(scene: Scene) -> Scene:
             f"damping: found {decay / omega:.2g} in the first mode at {omega / 2 / np.pi:.3g} Hz, "
             f"which rings for more than {_LONGEST:g} times the record; expected damped soils"
         )
-    data = _undamped(scene.data)
+    data = _undamped(_steady(scene))
     data["effects"] = {"rayleigh": {"alpha": float(alpha), "beta": float(beta)}}
     padded = next_fast_len(num_samples + math.ceil(rest), real=True)
     data["lapses"] = {"duration": padded * scene.dt}
@@ -95,8 +96,19 @@ def _require_a_twin(scene: Scene) -> None:
         )
 
 
+def _steady(scene: Scene) -> dict[str, Any]:
+    """A scene's table with one steady lapse, and a law whose matrices stand at powers of s."""
+    table = copy.deepcopy(scene.data)
+    table["lapses"] = {}
+    if scene.solver.complex_modulus == "maxwell":
+        solver = table.setdefault("solver", {})
+        solver["complex_modulus"] = "hysteretic"
+        solver.pop("reference_frequency", None)
+    return table
+
+
 def _undamped(data: dict[str, Any]) -> dict[str, Any]:
-    """A scene's table without what only a nonlinear or hysteretic run has."""
+    """A table without what only a nonlinear or hysteretic run has."""
     table = copy.deepcopy(data)
     for soil in table["soil"].values():
         soil.pop("curves", None)
@@ -114,7 +126,7 @@ def _first_mode(scene: Scene) -> tuple[float, float]:
     Returns:
         Circular frequency [rad/s] and damping ratio [-].
     """
-    data = copy.deepcopy(scene.data)
+    data = _steady(scene)
     data["effects"] = {}
     for motion in data["motion"]:
         motion["input"] = "within"  # holds the base

@@ -3,10 +3,10 @@
 
 - mesh size: Richardson. With D₁ and D₂ the distances of the mesh twice and four times as coarse
   from the fine one, D₂/D₁ = 2^p + 1 gives the order p, kept between 1 and 2·degree + 2, and
-  D₁/(2^p − 1) is left;
+  D₁/(2^p − 1) is left, less in the p-th power of what the finest mesh is finer by;
 - sweep: what a looser tolerance is off by, times the ratio of the two; a direct one is exact;
 - equivalent-linear loop: a third of what the next looser tolerance is off by, for it falls in
-  steps of whole iterations;
+  steps of whole iterations; times the ratio of the finest tolerance to the fine one;
 - points per cell, and a band that ends below the record's: all that the next coarser value is off
   by, for no law says how it falls.
 

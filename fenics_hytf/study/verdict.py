@@ -7,7 +7,9 @@ from collections.abc import Iterator
 
 from fenics_hytf.study.knobs import LABELS
 from fenics_hytf.study.records import (
+    SAME,
     TARGETS,
+    WORTH,
     Comparison,
     Study,
     cheapest,
@@ -16,9 +18,6 @@ from fenics_hytf.study.records import (
     measured,
 )
 from fenics_hytf.study.time_domain import METHODS
-
-_SAME = 1.1  # errors within this ratio are called the same
-_WORTH = 0.9  # a cost below this ratio is worth saying
 
 
 def sentences(study: Study) -> Iterator[str]:
@@ -92,7 +91,7 @@ def _bottleneck(study: Study) -> Iterator[str]:
         and error_of(point) < error_of(own)
     ]
     best = min(gains, key=error_of, default=None)
-    if best is None or error_of(best) * _SAME > error_of(own):
+    if best is None or error_of(best) * SAME > error_of(own):
         yield "No knob turned alone makes the scene much better: none is the bottleneck."
         return
     yield (
@@ -111,8 +110,8 @@ def _idle(study: Study) -> Iterator[str]:
         point
         for point in measured(study.points)
         if len(point.turned) == 1
-        and error_of(point) <= _SAME * error_of(own)
-        and core_s(point) < _WORTH * core_s(own)
+        and error_of(point) <= SAME * error_of(own)
+        and core_s(point) < WORTH * core_s(own)
     ]
     best = min(spare, key=core_s, default=None)
     if best is not None:
@@ -147,7 +146,7 @@ def _twin(twin: Comparison) -> Iterator[str]:
             )
             continue
         first, second = sorted((sweep, march), key=core_s)
-        if core_s(first) > _WORTH * core_s(second):
+        if core_s(first) > WORTH * core_s(second):
             yield (
                 f"Viscous twin, {percent(target)}: {first.name} and {second.name} cost about the "
                 f"same, {seconds(core_s(first))} and {seconds(core_s(second))}."

@@ -22,13 +22,13 @@ from fenics_hytf.motion import excited_lines, to_frequency
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import SimulationError, peak_memory, simulate
 from fenics_hytf.study.newmark import integrate
-from fenics_hytf.study.runs import Cost, Job, read_job, write_outcome
+from fenics_hytf.study.runs import COST, FAILURE, JOB, RESPONSE, Cost, Job, read_job, write_cost
 
 RealArray = npt.NDArray[np.float64]
 
 _REPEAT_BELOW = 2.0  # core-seconds
 _REPEATS = 3
-_FEW_LINES = 2
+_FEW_LINES = 2  # of a sweep, and samples of a march, that load all code
 _FEW_SAMPLES = 8
 
 
@@ -52,7 +52,7 @@ def main(folder: Path) -> int:
         The exit code: 0, or 3 where ``failure`` says why.
     """
     try:
-        job = read_job(folder / "job.json")
+        job = read_job(folder / JOB)
         warm(job)
         cost, response = measured(job, folder)
     except SceneError as error:
@@ -63,7 +63,7 @@ def main(folder: Path) -> int:
         return _fail(folder, "out of memory")
     if not np.isfinite(response).all():
         return _fail(folder, "the response holds values that are not numbers")
-    write_outcome(folder, cost, response)
+    write_cost(folder / COST, cost)
     return 0
 
 
@@ -126,7 +126,7 @@ def measured(job: Job, folder: Path) -> tuple[Cost, RealArray]:
     while not seconds or (len(seconds) < _REPEATS and min(seconds)[0] < _REPEAT_BELOW):
         cpu, wall = time.process_time(), time.perf_counter()
         response, work = action()
-        np.save(folder / "response.npy", response)
+        np.save(folder / RESPONSE, response)
         seconds.append((time.process_time() - cpu, time.perf_counter() - wall))
     core_s, wall_s = min(seconds)
     cost = Cost(
@@ -162,7 +162,7 @@ def _marched(job: Job) -> tuple[RealArray, Work]:
 
 
 def _fail(folder: Path, why: str) -> int:
-    (folder / "failure").write_text(why)
+    (folder / FAILURE).write_text(why)
     return 3
 
 

@@ -113,6 +113,21 @@ def test_overrides_can_be_given_on_the_command_line(tmp_path):
                 assert Scene.from_dict(data).hash == knob.scene_with(setting).hash
 
 
+@pytest.mark.parametrize(
+    ("lapses", "continuity", "law"),
+    [({"count": 1}, "steady", "hysteretic"), ({"count": 2}, "transient", "maxwell")],
+)
+def test_another_number_of_lapses_is_not_another_law(lapses, continuity, law):
+    knob = knobs(column(lapses=lapses, solver={}))
+    for count in knob.values["lapses"]:
+        turned = knob.scene_with(knob.own.turned("lapses", count))
+        assert len(turned.segments) == count
+        assert (turned.lapses.continuity, turned.solver.complex_modulus) == (continuity, law)
+    named = {"lapses": {"continuity": continuity}, "solver": {"complex_modulus": law}}
+    knob = knobs(column(lapses=lapses | named["lapses"], solver=named["solver"]))
+    assert knob.overrides(knob.own.turned("lapses", 4)) == {("lapses", "count"): 4}
+
+
 def test_only_knobs_that_the_scene_has():
     linear, looped = knobs(column()), knobs(column(loop=True))
     assert "loop" not in linear.values and set(looped.values) == set(KNOBS)
@@ -143,6 +158,13 @@ def test_a_finer_run_that_costs_too_much_is_left_out():
     assert left_out(knob, fine) and not left_out(
         knob, affordable(knob, Costs(knob, cheap), cheap, FINE)
     )
+
+
+def test_no_knob_is_coarser_than_the_scenes_own_where_direct_sweeps_fail():
+    knob = knobs(column(solver={"sweep": "reduced", "tolerance": 1e-8}))
+    knob.leave_out("sweep", 0.0)
+    dear = 1e3
+    assert affordable(knob, Costs(knob, dear), dear, (0.5, 15.0)).sweep == 1e-8
 
 
 def test_prediction_of_what_acts_alone_is_exact():
