@@ -20,7 +20,6 @@ from fenics_hytf.cli.outcome import (
     InputError,
     RunRequest,
     launched_rank,
-    not_in_this_version,
     tell,
 )
 
@@ -48,7 +47,9 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Override values of the scene; repeatable."),
 ]
-ForceOption = Annotated[bool, typer.Option("--force", help="Replace a finished result.")]
+ForceOption = Annotated[
+    bool, typer.Option("--force", help="Replace a finished result, or an unfinished run.")
+]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress, no summary.")]
 PlotsOption = Annotated[bool, typer.Option("--no-plots", help="No figures, no report.")]
 PlotOption = Annotated[
@@ -59,7 +60,10 @@ PlotOption = Annotated[
         help="Draw the curves of the soils, as PNG  [./<scene>-curves.png]",
     ),
 ]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="Not in this version.")]
+ResumeOption = Annotated[
+    bool,
+    typer.Option("--resume", help="Go on after the last lapse that was done; without any, start."),
+]
 GroupOption = Annotated[
     int | None,
     typer.Option(
@@ -143,10 +147,9 @@ def run(
     group_size: GroupOption = None,
 ) -> None:
     """Run a scene; under mpirun on all ranks."""
-    _refuse_later(resume)
     folder = output if output is not None else default_folder(scene)
     settings = (motion, tuple(overrides or ()), force, quiet, not no_plots, group_size)
-    _leave("run", RunRequest(scene, folder, *settings))
+    _leave("run", RunRequest(scene, folder, *settings, resume=resume))
 
 
 @app.command()
@@ -226,7 +229,6 @@ def demo(
     if name is None:
         typer.echo(list_demos())
         return
-    _refuse_later(resume)
     try:
         source = find_demo(name)
     except InputError as error:
@@ -235,7 +237,7 @@ def demo(
     scene = Path(source.name)
     folder = output if output is not None else default_folder(scene)
     settings = (motion, tuple(overrides or ()), force, quiet, not no_plots, group_size)
-    _leave("run", RunRequest(scene, folder, *settings, demo=source))
+    _leave("run", RunRequest(scene, folder, *settings, demo=source, resume=resume))
 
 
 @app.command()
@@ -275,22 +277,17 @@ def _is_launched() -> bool:
     return any(re.fullmatch(r"(OMPI_COMM_WORLD|PMIX|PMI)_RANK", name) for name in os.environ)
 
 
-def _refuse_later(resume: bool) -> None:
-    if resume:
-        tell([not_in_this_version("--resume")])
-        raise typer.Exit(INPUT)
-
-
 def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
     """Check the environment, run a command that solves, and leave with its exit code."""
     from fenics_hytf.cli.environment import environment_faults
+    from fenics_hytf.cli.interrupt import interruptible
 
-    faults = environment_faults()
-    if faults:
-        tell(faults)
-        raise typer.Exit(INPUT)
-    from fenics_hytf.cli import accuracy, check, run
-
+    with interruptible(None):  # loading what is heavy takes seconds
+        faults = environment_faults()
+        if faults:
+            tell(faults)
+            raise typer.Exit(INPUT)
+        from fenics_hytf.cli import accuracy, check, run
     commands: dict[str, Any] = {
         "run": run.run_scene,
         "check": check.check_scene,

@@ -76,13 +76,17 @@ def describe(inspection: Inspection) -> str:
     """The answer for a scene without faults."""
     lines = inspection.lines
     lapses = f"{inspection.lapses} of {inspection.samples_per_lapse} samples"
-    solved = f"{sum(lines)}" if len(lines) == 1 else f"{sum(lines)}, {min(lines)}-{max(lines)} each"
+    low, high = min(lines), max(lines)
+    each = f"{low}" if low == high else f"{low}-{high}"
+    solved = f"{sum(lines)}" if len(lines) == 1 else f"{sum(lines)}, {each} each"
     rows = [
         ("effects", ", ".join(inspection.effects) or "none"),
         ("cells", f"{inspection.cells}"),
         ("unknowns", f"{inspection.unknowns}"),
         ("points", f"{inspection.points}"),
         ("lapses", lapses),
+        ("continuity", inspection.continuity),
+        ("complex modulus", inspection.complex_modulus),
         ("lines to solve", solved),
         ("factorisations", f"at most {inspection.factorisations}"),
         ("memory", f"about {inspection.memory_bytes / 2**20:.0f} MiB"),

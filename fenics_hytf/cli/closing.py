@@ -38,11 +38,21 @@ def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
         change = lapses[-1]["final_change"]
         last = "" if change is None else f", last change {change:.1e}"
         rows.append(("iterations", f"{sum(iterations)}{last}"))
+    rows += _seams(summary)
     rows += _base(summary)
     rows += _peaks(summary)
     rows += [("warning", text) for text in summary["warnings"]]
     rows.append(("results", f"{folder / 'report.html' if plots else folder}"))
     return "\n".join([summary["title"], *(f"  {name:11s} {text}" for name, text in rows)])
+
+
+def _seams(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """How well lapses join, and the balance of energy."""
+    error, energy = summary["worst_seam_error"], summary["energy"]
+    words = [] if error is None else [f"error of a seam at most {error:.1e} (estimate)"]
+    if energy is not None and energy["worst_imbalance"] is not None:
+        words.append(f"energy of a lapse off by at most {energy['worst_imbalance']:.1e} of input")
+    return [("seams", ", ".join(words))] if words else []
 
 
 def _base(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

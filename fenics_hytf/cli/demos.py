@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 import tomllib
 from collections.abc import Iterator
@@ -98,22 +97,6 @@ def copy_demo(copies: list[Copy]) -> None:
     for copy in copies:
         if not _is_there(copy):
             Path(copy.name).write_bytes(copy.content)
-
-
-def is_same_demo(folder: Path, scene_hash: str) -> bool:
-    """Whether a folder holds a finished result of the very same scene.
-
-    Args:
-        folder: The result folder.
-        scene_hash: Hash of the scene.
-    """
-    from fenics_hytf.results import FINISHED
-
-    try:
-        summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
-    return isinstance(summary, dict) and summary.get("scene_hash") == scene_hash
 
 
 def _copies(demo: Path) -> Iterator[Copy]:

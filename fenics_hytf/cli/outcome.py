@@ -26,11 +26,12 @@ class RunRequest:
         folder: Result folder.
         motion: Record in the place of the first motion's, or ``None``.
         overrides: ``key=value`` for the scene.
-        force: Whether a finished result may be replaced.
+        force: Whether a finished result, or an unfinished run, may be replaced.
         quiet: No progress, no summary.
         plots: Whether figures and the report are made.
         group_size: Ranks that share a mesh; from memory if ``None``.
         demo: Where the scene is copied from, or ``None``.
+        resume: Whether an unfinished run is gone on with.
     """
 
     scene: Path
@@ -42,6 +43,7 @@ class RunRequest:
     plots: bool = True
     group_size: int | None = None
     demo: Path | None = None
+    resume: bool = False
 
 
 class InputError(ValueError):
@@ -58,11 +60,6 @@ class InputError(ValueError):
 
 class WriteError(RuntimeError):
     """Results could not be written while a run was under way."""
-
-
-def not_in_this_version(name: str) -> str:
-    """The message for something that a later version brings."""
-    return f"{name}: not in this version"
 
 
 def launched_rank() -> int:

@@ -29,11 +29,14 @@ class Estimate:
         self.fraction = 0.0
         self._clock = clock
         self._start = clock()
+        self._before: float | None = None  # fraction that an earlier run had done
         self._expected = float(_FIRST_GUESS)
         self._iterations = 0
 
     def update(self, progress: Progress) -> None:
         """Take in a report; the free field of a side takes next to no time."""
+        if self._before is None:
+            self._before = progress.lapse / progress.num_lapses
         if progress.side:
             return
         within = progress.done / progress.total if progress.total else 0.0
@@ -50,9 +53,10 @@ class Estimate:
     @property
     def seconds_left(self) -> float | None:
         """Time left if the rest goes as what is done [s]; ``None`` where it is too early to say."""
-        if self.fraction < _STEADY:
+        done = self.fraction - (self._before or 0.0)
+        if done < _STEADY:
             return None
-        return (self._clock() - self._start) * (1.0 - self.fraction) / self.fraction
+        return (self._clock() - self._start) * (1.0 - self.fraction) / done
 
 
 def describe(progress: Progress) -> str:

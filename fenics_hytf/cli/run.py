@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import typer
@@ -15,7 +13,8 @@ from mpi4py import MPI
 
 from fenics_hytf.cli.closing import closing_words
 from fenics_hytf.cli.collective import at_root, load_scene
-from fenics_hytf.cli.demos import Copy, copy_demo, is_same_demo, plan_demo
+from fenics_hytf.cli.demos import Copy, copy_demo, plan_demo
+from fenics_hytf.cli.interrupt import interruptible
 from fenics_hytf.cli.outcome import (
     BUG,
     DONE,
@@ -28,9 +27,19 @@ from fenics_hytf.cli.outcome import (
     tell,
 )
 from fenics_hytf.cli.progress import show_progress
-from fenics_hytf.results import ResultFolder, folder_faults, open_result, publish
+from fenics_hytf.results import (
+    CHECKPOINT,
+    FINISHED,
+    ResultFolder,
+    folder_faults,
+    is_result_of,
+    open_result,
+    publish,
+)
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import (
+    CheckpointError,
+    CheckpointFolder,
     Result,
     SimulationError,
     Snapshot,
@@ -54,9 +63,9 @@ def guarded(command: Command, request: RunRequest, comm: MPI.Comm = MPI.COMM_WOR
         The exit code.
     """
     try:
-        with _terminate_as_interrupt():
+        with interruptible(comm):
             return command(request, comm)
-    except InputError as error:  # on all ranks alike, as are the next three
+    except InputError as error:  # on all ranks alike, as are the next four
         _tell_once(comm, error.faults)
         return INPUT
     except SceneError as error:  # a fault that only the mesh shows
@@ -65,11 +74,14 @@ def guarded(command: Command, request: RunRequest, comm: MPI.Comm = MPI.COMM_WOR
     except SimulationError as error:
         _tell_once(comm, [f"stopped: {error}"])
         return STOPPED
+    except CheckpointError as error:
+        _tell_once(comm, [f"stopped: {error}"])
+        return STOPPED
     except WriteError as error:
         _tell_once(comm, [f"stopped: results cannot be written ({error})"])
         return STOPPED
-    except KeyboardInterrupt:
-        _tell_once(comm, ["interrupted"])
+    except KeyboardInterrupt as error:
+        _tell_once(comm, [str(error) or "interrupted"])
         return _leave_alone(comm, INTERRUPTED)
     except Exception:
         traceback.print_exc()
@@ -89,34 +101,42 @@ def run_scene(request: RunRequest, comm: MPI.Comm) -> int:
     Raises:
         InputError: If the input is wrong; nothing is written then.
         SimulationError: If the numerics stopped; the lapses before are written.
+        CheckpointError: If a checkpoint could not be written; the one before is kept.
         WriteError: If results could not be written.
     """
     scene, force = _prepare(request, comm)
-    folder = at_root(comm, lambda: open_result(request.folder, force))
+    if comm.bcast(at_root(comm, lambda: _is_finished(request, scene.hash))):
+        _say(request, comm, [f"{request.folder}: finished already ({FINISHED}); nothing to do"])
+        return DONE
+    folder = at_root(comm, lambda: open_result(request.folder, force, request.resume))
     try:
-        result = _simulate(request, scene, folder, comm)
-        summary = at_root(comm, lambda: _finish(request, folder, result))
+        checkpoint = _checkpoint(request, scene, folder, comm)
+        with interruptible(comm, lambda: _farewell(checkpoint, scene), lambda: _close(folder)):
+            result = _simulate(request, scene, folder, checkpoint, comm)
+            summary = at_root(comm, lambda: _finish(request, folder, result))
     finally:
-        if folder is not None:
-            folder.close()
+        _close(folder)
     if summary is not None and not request.quiet:
         typer.echo(closing_words(summary, request.folder, request.plots))
     return DONE
 
 
 def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
-    """The scene, and whether a finished result may be replaced; after a look for all faults."""
+    """The scene, and whether a result that is there may be replaced; after a look for all faults.
+
+    The folder's faults do not count where it holds the finished result that is asked for.
+    """
     copies: list[Copy] | None = None
     scene: Scene | None = None
+    force = request.force
     if request.demo is None:
         scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
-        force = request.force
+        scene_hash = scene.hash if scene is not None else ""
     else:
         demo = request.demo
-        plan = comm.bcast(at_root(comm, lambda: plan_demo(demo, request)))
-        copies, faults, scene_hash = plan
-        force = request.force or is_same_demo(request.folder, scene_hash)
-    faults += comm.bcast(at_root(comm, lambda: folder_faults(request.folder, force)))
+        copies, faults, scene_hash = comm.bcast(at_root(comm, lambda: plan_demo(demo, request)))
+        force = force or is_result_of(request.folder, scene_hash)
+    faults += comm.bcast(at_root(comm, lambda: _folder_faults(request, scene_hash, force)))
     faults += group_faults(request.group_size, comm.size)
     if faults and scene is not None:
         faults += [str(fault) for fault in mesh_faults(scene, comm)[1]]
@@ -130,15 +150,77 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
     return scene, force
 
 
-def _simulate(
+def _folder_faults(request: RunRequest, scene_hash: str, force: bool) -> list[str]:
+    if _is_finished(request, scene_hash):
+        return []
+    return folder_faults(request.folder, force, request.resume)
+
+
+def _is_finished(request: RunRequest, scene_hash: str) -> bool:
+    """Whether a run that is to be gone on with has come to its end."""
+    return request.resume and not request.force and is_result_of(request.folder, scene_hash)
+
+
+def _checkpoint(
     request: RunRequest, scene: Scene, folder: ResultFolder | None, comm: MPI.Comm
+) -> CheckpointFolder:
+    """Where the run keeps its checkpoint, and the one that it goes on from."""
+    path = request.folder / CHECKPOINT
+    first = folder.clear if folder is not None else None
+    try:
+        checkpoint = CheckpointFolder(path, scene, comm, request.resume, first)
+    except SceneError as error:
+        advice = (
+            f"{path}: found the checkpoint of another scene; expected that of this one. Put the "
+            "keys above back, or start anew: --force instead of --resume"
+        )
+        raise InputError([*map(str, error.faults), advice]) from error
+    except CheckpointError as error:
+        raise InputError([str(error)]) from error
+    if checkpoint.found is not None:
+        if folder is not None:
+            folder.go_on()
+        _say(request, comm, [f"going on after {_lapse(checkpoint, scene)}", *checkpoint.notes])
+    elif request.resume:
+        _say(request, comm, [f"{path}: found no checkpoint; starting at the first lapse"])
+    return checkpoint
+
+
+def _farewell(checkpoint: CheckpointFolder, scene: Scene) -> str:
+    """What to say when the run is interrupted."""
+    if checkpoint.lapse is None:
+        return "interrupted: no lapse was done, there is no checkpoint"
+    return (
+        f"interrupted: the checkpoint after {_lapse(checkpoint, scene)} is kept in "
+        f"{checkpoint.path}. Go on with the same command and --resume"
+    )
+
+
+def _lapse(checkpoint: CheckpointFolder, scene: Scene) -> str:
+    assert checkpoint.lapse is not None
+    return f"lapse {checkpoint.lapse} ({checkpoint.lapse + 1} of {len(scene.segments)})"
+
+
+def _simulate(
+    request: RunRequest,
+    scene: Scene,
+    folder: ResultFolder | None,
+    checkpoint: CheckpointFolder,
+    comm: MPI.Comm,
 ) -> Result:
     def snapshot(snapshot: Snapshot) -> None:
         at_root(comm, lambda: folder.snapshot(snapshot) if folder is not None else None)
 
     with show_progress(quiet=request.quiet or comm.rank != 0) as progress:
         try:
-            return simulate(scene, comm, progress, snapshot, group_size=request.group_size)
+            return simulate(
+                scene,
+                comm,
+                progress,
+                snapshot,
+                group_size=request.group_size,
+                checkpoint=checkpoint,
+            )
         except SimulationError as error:
             partial = error.partial
             if partial is not None:
@@ -151,18 +233,14 @@ def _finish(request: RunRequest, folder: ResultFolder | None, result: Result) ->
     return folder.write(result, publish if request.plots else None)
 
 
-@contextmanager
-def _terminate_as_interrupt() -> Iterator[None]:
-    """SIGTERM ends a run as Ctrl-C does."""
+def _close(folder: ResultFolder | None) -> None:
+    if folder is not None:
+        folder.close()
 
-    def interrupt(_number: int, _frame: object) -> None:
-        raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
+def _say(request: RunRequest, comm: MPI.Comm, messages: list[str]) -> None:
+    if not request.quiet:
+        _tell_once(comm, messages)
 
 
 def _tell_once(comm: MPI.Comm, messages: list[str]) -> None:

@@ -2,59 +2,74 @@
 """One lapse: the ground, its equations, the equivalent-linear loop, the response, convection."""
 
 from fenics_hytf.lapse.base import BaseProbe, outcrop_motion, within_motion
+from fenics_hytf.lapse.cells import CarriedCells, CellPeaks, CellProbe
+from fenics_hytf.lapse.continuity import Continuity, Steady, excite
 from fenics_hytf.lapse.convective import cell_stress, convect
+from fenics_hytf.lapse.cycles import CycleCount
+from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
-from fenics_hytf.lapse.errors import EmptyCellError, EquivalentLinearError, LapseError
-from fenics_hytf.lapse.free_field import FreeField, column_supports
-from fenics_hytf.lapse.ground import (
-    ElasticConstants,
-    Ground,
-    Moduli,
-    complex_constants,
-    seed_points,
-    survey,
+from fenics_hytf.lapse.errors import (
+    EmptyCellError,
+    EquivalentLinearError,
+    LapseError,
+    VolumeError,
 )
+from fenics_hytf.lapse.excitation import Excitation
+from fenics_hytf.lapse.free_field import FreeField, FreeFieldState, column_supports
+from fenics_hytf.lapse.ground import Ground, Moduli, seed_points, survey
+from fenics_hytf.lapse.handover import Handover
+from fenics_hytf.lapse.material import ElasticConstants, Material, Part, material
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
-from fenics_hytf.lapse.response import (
-    CellPeaks,
-    CellProbe,
-    Excitation,
-    Histories,
-    ReceiverProbe,
-)
-from fenics_hytf.lapse.run import Observer, Solved, excite, solve
+from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
+from fenics_hytf.lapse.run import Observer, Solved, solve
+from fenics_hytf.lapse.schemes import choose_continuity
+from fenics_hytf.lapse.whole_record import WholeRecord
 
 __all__ = [
     "Anderson",
     "BaseProbe",
+    "CarriedCells",
     "CellPeaks",
     "CellProbe",
     "CellState",
+    "Continuity",
+    "CycleCount",
     "ElasticConstants",
     "EmptyCellError",
+    "Energy",
     "Equations",
     "EquivalentLinearError",
     "Excitation",
     "FreeField",
+    "FreeFieldState",
     "Ground",
+    "Handover",
     "Histories",
     "LapseEquations",
     "LapseError",
     "LapseResult",
     "LoopHistory",
+    "Material",
     "Moduli",
     "Observer",
+    "Part",
     "ReceiverProbe",
+    "Response",
     "Solved",
+    "Spectra",
+    "Steady",
+    "VolumeError",
+    "WholeRecord",
     "cell_stress",
+    "choose_continuity",
     "column_supports",
-    "complex_constants",
     "convect",
     "excite",
     "first_strain",
     "iterate",
+    "material",
     "outcrop_motion",
     "peak_length",
     "peak_shear_strain",

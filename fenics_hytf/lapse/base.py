@@ -16,12 +16,10 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.frequency import Sweep
-from fenics_hytf.lapse.equations import Equations
-from fenics_hytf.lapse.response import Excitation
+from fenics_hytf.lapse.equations import Equations, rock_factors
+from fenics_hytf.lapse.response import Response, Spectra
 from fenics_hytf.operators import boundary_area, constrained_rows, mean_rows
 from fenics_hytf.scene import Scene
-from fenics_hytf.soil import wave_factors
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -46,38 +44,51 @@ class BaseProbe:
         if self._rows is not None:
             self._rows.destroy()
 
-    def mean(self, sweep: Sweep, excitation: Excitation) -> ComplexArray:
-        """Mean transfer function h of the base: relative to the motion that is given.
+    def motion(self, response: Response) -> Spectra:
+        """Mean displacement of the base, relative to the motion that is given.
 
         Args:
-            sweep: Transfer functions h.
-            excitation: The input.
+            response: The response.
 
         Returns:
-            Shape ``(num_components, num_motions, num_lines)``; nought where the base is held.
+            ``num_components`` of them; nought where the base is held.
         """
-        shape = (self._domain.num_components, len(excitation.axes), len(excitation.lines))
         if self._rows is None:
-            return np.zeros(shape, complex)
-        return np.asarray(self._domain.comm.allreduce(sweep.project(self._rows)))
+            shape = (self._domain.num_components, len(response.excitation.lines))
+            return Spectra(np.zeros(shape, complex))
+        mine, comm = response.spectra(self._rows), self._domain.comm
+        start = None if mine.start is None else comm.allreduce(mine.start)
+        return Spectra(np.asarray(comm.allreduce(mine.coefficients)), start)
+
+    def at(self, unknowns: RealArray) -> RealArray:
+        """The same of unknowns at one instant, shape ``(num_components,)``."""
+        if self._rows is None:
+            return np.zeros(self._domain.num_components)
+        x, mean = self._rows.createVecs()
+        x.array[:] = unknowns
+        self._rows.mult(x, mean)
+        total = self._domain.comm.allreduce(mean.array_r.real.copy())
+        x.destroy()
+        mean.destroy()
+        return np.asarray(total)
 
 
-def within_motion(excitation: Excitation, base: ComplexArray) -> RealArray:
+def within_motion(response: Response, base: Spectra) -> RealArray:
     """Total acceleration of the base in the direction of each motion.
 
     Args:
-        excitation: The input.
-        base: Its mean transfer function h, as :meth:`BaseProbe.mean` gives it.
+        response: The response.
+        base: Mean displacement of the base, as :meth:`BaseProbe.motion` gives it.
 
     Returns:
-        On the solved lines [m/s^2], shape ``(num_motions, num_samples)``.
+        [m/s^2], shape ``(num_motions, num_samples)``.
     """
-    moved = excitation.respond(-(excitation.omega**2) * base)
-    return excitation.to_time(excitation.weights + moved[list(excitation.axes)])
+    given = response.excitation
+    return given.base_acceleration + response.history(base[list(given.axes)], 2)
 
 
 def outcrop_motion(
-    scene: Scene, domain: Domain, equations: Equations, sweep: Sweep, excitation: Excitation
+    scene: Scene, domain: Domain, equations: Equations, response: Response
 ) -> RealArray | None:
     """Acceleration of bare rock in the direction of each motion.
 
@@ -89,32 +100,30 @@ def outcrop_motion(
         scene: The scene.
         domain: The domain.
         equations: The equations.
-        sweep: Transfer functions h.
-        excitation: The input.
+        response: The response.
 
     Returns:
         On the solved lines [m/s^2], shape ``(num_motions, num_samples)``; ``None`` where the
         scene does not tell the rock, or the traction.
     """
-    rock = scene.boundary.rock
+    rock, given = scene.boundary.rock, response.excitation
     if rock is None:
         return None
     if not equations.base_is_held:
-        return excitation.to_time(excitation.weights)
-    if not _traction_is_known(scene):
+        return given.base_acceleration
+    if not _traction_is_known(scene) or given.given is not None:
         return None
-    force = _base_force(domain, equations, sweep, excitation)
+    force = _base_force(domain, equations, response)
     vertical = domain.components.index("y") if "y" in domain.components else None
     velocity = [
         rock.p_wave_velocity if axis == vertical else rock.shear_wave_velocity
-        for axis in excitation.axes
+        for axis in given.axes
     ]
-    solver = scene.solver
-    factors = wave_factors(rock.damping, rock.poisson, solver.complex_modulus, solver.keep)
-    roots = np.sqrt([factors[0 if axis == vertical else 1] for axis in excitation.axes])
+    factors = rock_factors(scene)
+    roots = np.sqrt([factors[0 if axis == vertical else 1] for axis in given.axes])
     impedance = rock.density * np.array(velocity) * roots * boundary_area(domain, "base")
     # v_outcrop − v_within = τ/ρV*; at rest they are the same
-    return excitation.to_time(excitation.weights + excitation.s * force / impedance[:, None])
+    return given.to_time(given.motion_weights + given.s * force / impedance[:, None])
 
 
 def _traction_is_known(scene: Scene) -> bool:
@@ -129,23 +138,22 @@ def _traction_is_known(scene: Scene) -> bool:
     )
 
 
-def _base_force(
-    domain: Domain, equations: Equations, sweep: Sweep, excitation: Excitation
-) -> ComplexArray:
+def _base_force(domain: Domain, equations: Equations, response: Response) -> ComplexArray:
     """Force on the base in the direction of each motion, shape ``(num_motions, num_lines)``."""
-    total = -(excitation.omega**2) * _inertia_rows(domain, equations, sweep)
-    for motion, (axis, Mr) in enumerate(zip(excitation.axes, equations.influence, strict=True)):
+    given = response.excitation
+    total = given.s**2 * _inertia_rows(domain, equations, response)
+    for motion, (axis, Mr) in enumerate(zip(given.axes, equations.influence, strict=True)):
         mass = Mr.array_r[axis :: domain.num_components].real.sum()
         total[motion, motion] += domain.comm.allreduce(float(mass))
-    return excitation.respond(total)
+    return np.einsum("fmk,mk->fk", total, given.motion_weights)
 
 
-def _inertia_rows(domain: Domain, equations: Equations, sweep: Sweep) -> ComplexArray:
+def _inertia_rows(domain: Domain, equations: Equations, response: Response) -> ComplexArray:
     """rᵀM T h of each direction and motion, shape ``(num_motions, num_motions, num_lines)``."""
     owned = np.stack([Mr.array_r.real for Mr in equations.influence])
     ghosts = domain.V.dofmap.index_map.num_ghosts * domain.num_components
     local = sparse.csr_matrix(np.pad(owned, ((0, 0), (0, ghosts))))
     rows = constrained_rows(domain, local, equations.T)
-    projected = sweep.project(rows)
+    projected = response.transfer(rows)
     rows.destroy()
     return np.asarray(domain.comm.allreduce(projected))

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.lapse.ground import ElasticConstants
+from fenics_hytf.lapse.errors import VolumeError
+from fenics_hytf.lapse.material import ElasticConstants
 from fenics_hytf.particles import (
     MoveReport,
     Points,
@@ -28,6 +29,8 @@ from fenics_hytf.particles import (
 
 RealArray = npt.NDArray[np.float64]
 
+_LEAST_VOLUME = 0.1  # of a point over that at the start; its inverse is the most
+
 
 def convect(
     domain: Domain,
@@ -37,6 +40,7 @@ def convect(
     constants: ElasticConstants | None = None,
     velocity: RealArray | None = None,
     acceleration: RealArray | None = None,
+    density: RealArray | None = None,
 ) -> MoveReport:
     """Move the points with the nodes' increment and find them again (collective).
 
@@ -50,11 +54,14 @@ def convect(
             stress.
         velocity: At the nodes at the end of the lapse [m/s], for points that carry it.
         acceleration: Likewise [m/s^2].
+        density: Of each region when it was seeded [kg/m^3], to know a point's volume then.
 
     Returns:
         The mass ledger, and how many points were mapped.
 
     Raises:
+        VolumeError: A point's volume has become less than a tenth, or more than ten times, of what
+            it was.
         PointsOutside: A point left the mesh and ``outside`` is ``error``.
         PointsNotFinite: The increment is not finite. Each is raised on every rank, and leaves the
             points as they were.
@@ -76,10 +83,22 @@ def convect(
     if np.isfinite(gradient).all():
         update_kinematics(points, gradient, **moduli)
     try:
+        if density is not None:
+            _require_volume(domain, points, density)
         return move(domain.mesh, points, displacement, outside)
-    except (PointsOutside, PointsNotFinite):
+    except (PointsOutside, PointsNotFinite, VolumeError):
         points.assign(before)
         raise
+
+
+def _require_volume(domain: Domain, points: Points, density: RealArray) -> None:
+    """No point has collapsed or blown up; agreed on by all ranks."""
+    ratio = points.volume * density[points.region] / points.mass
+    wrong = ~((ratio >= _LEAST_VOLUME) & (ratio <= 1 / _LEAST_VOLUME))
+    shares = domain.comm.allgather((points.id[wrong].tolist(), ratio[wrong].tolist()))
+    found = sorted(pair for ids, ratios in shares for pair in zip(ids, ratios, strict=True))
+    if found:
+        raise VolumeError([point for point, _ in found], found[0][1])
 
 
 def cell_stress(domain: Domain, points: Points) -> RealArray:

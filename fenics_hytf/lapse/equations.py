@@ -14,26 +14,28 @@ Matrices and forms are made once a run and refilled; what the scene does not cal
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
+from dolfinx import la
 from dolfinx.fem import Function
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain, constraint_matrix
 from fenics_hytf.frequency import (
+    AffineLoads,
     DynamicSystem,
     Loads,
     ScalarFunction,
     constant,
-    hysteretic,
     radiation,
 )
-from fenics_hytf.lapse.ground import ElasticConstants, Ground
+from fenics_hytf.lapse.ground import Ground
+from fenics_hytf.lapse.material import ElasticConstants, Material, Part
 from fenics_hytf.operators import (
     DashpotForm,
     ElasticForm,
@@ -48,6 +50,8 @@ from fenics_hytf.soil import wave_factors
 RealArray = npt.NDArray[np.float64]
 
 _PRODUCT = "matptap_via"  # how PETSc multiplies TᵀAT
+_MASS_TOLERANCE = 1e-14  # residual: what starts a lapse is known as well as it can be
+_MASS_STEPS = 200  # a consistent mass takes 20 to 40
 
 
 class SideForce(Protocol):
@@ -56,8 +60,11 @@ class SideForce(Protocol):
     def fasten(self, normal: RealArray, tangential: RealArray) -> None:
         """Take the impedances of the section's cells [kg/(m² s)], shape ``(num_local_cells,)``."""
 
-    def add_force(self, line: int, motion: int, nodal: PETSc.Vec) -> None:
-        """Add its nodal forces for a unit of a motion at a line."""
+    def add_force(self, line: int, side: int, nodal: PETSc.Vec) -> None:
+        """Add its nodal forces for a unit of a motion at a line, or for what it has carried."""
+
+    def add_start(self, derivative: int, nodal: PETSc.Vec) -> None:
+        """Add its nodal forces at the start of the lapse, or their rate."""
 
 
 @dataclass(frozen=True)
@@ -67,10 +74,14 @@ class LapseEquations:
     Attributes:
         system: A(s) of the lapse.
         loads: −TᵀM r of each motion [kg, in 2D kg/m], with what comes from beyond the sides.
+        viscous: What is multiplied by the velocity: C and the dashpots of a base.
+        stiff: What is multiplied by the displacement, and how much of it against a jump.
     """
 
     system: DynamicSystem
     loads: list[PETSc.Vec] | Loads
+    viscous: list[PETSc.Mat]
+    stiff: list[tuple[PETSc.Mat, float]]
 
 
 class Equations:
@@ -106,10 +117,10 @@ class Equations:
         # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
         self._radiating: list[tuple[PETSc.Mat, ScalarFunction]] = []
-        # Of each motion: M r at the nodes, −TᵀM r, and that with the forces of a line.
+        # Of each motion: M r at the nodes, and −TᵀM r.
         self._influence: list[PETSc.Vec] = []
         self._inertia: list[PETSc.Vec] = []
-        self._loaded: list[PETSc.Vec] = []
+        self._mass_solver: PETSc.KSP | None = None
 
     @property
     def across(self) -> MPI.Comm:
@@ -135,9 +146,11 @@ class Equations:
         """Destroy all PETSc objects."""
         for owned in (self.T, self._K, *self._constrained.values(), *self._vectors()):
             owned.destroy()
+        if self._mass_solver is not None:
+            self._mass_solver.destroy()
 
     def _vectors(self) -> list[PETSc.Vec]:
-        return [*self._influence, *self._inertia, *self._loaded]
+        return [*self._influence, *self._inertia]
 
     def weigh(self, points: Points) -> None:
         """Rebuild M = SᵀM_pS (4) and the right-hand sides −TᵀM r from the points.
@@ -155,7 +168,6 @@ class Equations:
         # M r on all nodes, before constraining: held ones pull on their neighbours too.
         self._influence = [self._weigh_direction(M, direction) for direction in self.axes]
         self._inertia = [self._inertia_force(Mr) for Mr in self._influence]
-        self._loaded = [load.duplicate() for load in self._inertia if self._side_forces]
         self._constrain("mass", M)
         M.destroy()
 
@@ -169,13 +181,11 @@ class Equations:
 
     def _stand_on_rock(self, cells: int) -> None:
         """Dashpots ρV of the rock, those of P and of S waves apart where they damp otherwise."""
-        rock, solver = self._scene.boundary.rock, self._scene.solver
+        rock = self._scene.boundary.rock
         assert rock is not None
         across = np.full(cells, rock.density * rock.p_wave_velocity)
         along = np.full(cells, rock.density * rock.shear_wave_velocity)
-        pressure, shear = wave_factors(
-            rock.damping, rock.poisson, solver.complex_modulus, solver.keep
-        )
+        pressure, shear = rock_factors(self._scene)
         parts = [(across, along, shear)]
         if pressure != shear:
             parts = [(across, 0 * along, pressure), (0 * across, along, shear)]
@@ -226,38 +236,49 @@ class Equations:
             self._assemblies["geometric"] += 1
             self._constrain("geometric", self._K)
 
-    def assemble(
-        self, ground: Ground, real: ElasticConstants, imaginary: ElasticConstants | None
-    ) -> LapseEquations:
+    def assemble(self, ground: Ground, material: Material) -> LapseEquations:
         """Assemble A(s) with the moduli of an iteration.
 
         Args:
             ground: The ground, for its density.
-            real: Real parts of the elastic constants, cells in the order of the input.
-            imaginary: Imaginary parts, or ``None`` without material damping.
+            material: The law of every cell.
 
         Returns:
             The equations, valid until the next call.
         """
-        K = self._stiffness("real", real)
-        terms: list[tuple[PETSc.Mat, ScalarFunction]] = [(K, constant)]
-        if imaginary is not None:
-            terms.append((self._stiffness("imaginary", imaginary), hysteretic))
+        parts = [(self._stiffness(p.name, p.constants), p) for p in material.parts]
+        terms = [(matrix, part.function) for matrix, part in parts]
+        stiff = [(matrix, part.instantaneous) for matrix, part in parts]
         if "geometric" in self._constrained:
-            terms.append((self._constrained["geometric"], constant))
+            geometric = self._constrained["geometric"]
+            terms.append((geometric, constant))
+            stiff.append((geometric, 1.0))
         terms += self._radiating
-        system = DynamicSystem(terms, self._constrained["mass"], self._damping(K, ground, real))
-        return LapseEquations(system, _LineLoads(self) if self._side_forces else self._inertia)
+        damping = self._damping(parts, ground, material.real)
+        system = DynamicSystem(terms, self._constrained["mass"], damping)
+        return LapseEquations(
+            system,
+            self.with_sides(self._inertia),
+            [matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
+            stiff,
+        )
 
     def _damping(
-        self, K: PETSc.Mat, ground: Ground, constants: ElasticConstants
+        self, parts: list[tuple[PETSc.Mat, Part]], ground: Ground, constants: ElasticConstants
     ) -> PETSc.Mat | None:
         """C: Rayleigh damping, and the dashpots of the sides with the cells' own moduli."""
         C, rayleigh = None, self._scene.effects.rayleigh
+        same = PETSc.Mat.Structure.SAME_NONZERO_PATTERN
         if rayleigh is not None:
             if "rayleigh" in self._constrained:
                 self._constrained.pop("rayleigh").destroy()
-            C = rayleigh_damping(self._constrained["mass"], K, rayleigh.alpha, rayleigh.beta)
+            C = rayleigh_damping(
+                self._constrained["mass"], parts[0][0], rayleigh.alpha, rayleigh.beta
+            )
+            for matrix, part in parts[1:]:  # βK of K at the frequency at which the modulus is G
+                share = self.share_at_reference(part)
+                if share:
+                    C.axpy(rayleigh.beta * share, matrix, structure=same)
             self._constrained["rayleigh"] = C
             self._assemblies["rayleigh"] += 1
         if self._dashpots is None:
@@ -272,29 +293,92 @@ class Equations:
         dashpots = self._constrain("dashpot", self._K)
         if C is None:
             return dashpots
-        C.axpy(1.0, dashpots, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        C.axpy(1.0, dashpots, structure=same)
         return C
 
-    def loads(self, line: int) -> list[PETSc.Vec]:
-        """Right-hand sides with the forces from beyond the sides, which differ between lines."""
-        nodal = self.T.createVecLeft()
-        for motion, (load, inertia) in enumerate(zip(self._loaded, self._inertia, strict=True)):
-            nodal.zeroEntries()
-            for side in self._side_forces:
-                side.add_force(line, motion, nodal)
-            self.T.multTranspose(nodal, load)
-            load.axpy(1.0, inertia)
-        nodal.destroy()
-        return self._loaded
+    def share_at_reference(self, part: Part) -> float:
+        """Real part of a function of s where the modulus is G; nought for hysteretic damping."""
+        frequency = self._scene.solver.reference_frequency or 1.0
+        return float(np.real(part.function(2j * np.pi * frequency)))
 
-    def expand(self, q: npt.NDArray[np.complex128]) -> RealArray:
-        """Nodal field u = T q of a real response.
+    def with_sides(self, loads: list[PETSc.Vec] | AffineLoads) -> list[PETSc.Vec] | Loads:
+        """Right-hand sides with the forces from beyond the sides, which differ between lines."""
+        return _SideLoads(self, loads) if self._side_forces else loads
+
+    def add_side_forces(self, line: int, side: int, load: PETSc.Vec) -> None:
+        """Add what comes from beyond the sides to a right-hand side of a line."""
+        self._add_from_sides(lambda force, nodal: force.add_force(line, side, nodal), load)
+
+    def add_side_start(self, derivative: int, load: PETSc.Vec) -> None:
+        """Add what comes from beyond the sides at the start of the lapse, or its rate."""
+        self._add_from_sides(lambda force, nodal: force.add_start(derivative, nodal), load)
+
+    def _add_from_sides(self, add: Callable[[SideForce, PETSc.Vec], None], load: PETSc.Vec) -> None:
+        if not self._side_forces:
+            return
+        nodal = self.T.createVecLeft()
+        for force in self._side_forces:
+            add(force, nodal)
+        self.T.multTransposeAdd(nodal, load, load)
+        nodal.destroy()
+
+    @property
+    def inertia(self) -> list[PETSc.Vec]:
+        """−TᵀM r of each motion [kg], borrowed until the points are weighed again."""
+        return self._inertia
+
+    def collect(self, nodal: RealArray) -> PETSc.Vec:
+        """Force on the unknowns of what all ranks' cells or points do to their nodes (collective).
+
+        Args:
+            nodal: This rank's, at its local nodes, ghosts included, components fastest, shape
+                ``(num_local_nodes·num_components,)``.
+
+        Returns:
+            Tᵀ of their sum; the caller destroys it.
+        """
+        sums = Function(self._domain.V)
+        sums.x.array[:] = nodal
+        sums.x.scatter_reverse(la.InsertMode.add)
+        force, nodes = self.T.createVecs()
+        nodes.array[:] = sums.x.array[: nodes.getLocalSize()]
+        self.T.multTranspose(nodes, force)
+        nodes.destroy()
+        return force
+
+    def accelerate(self, force: PETSc.Vec) -> RealArray:
+        """M⁻¹ f on this rank's unknowns (collective), by conjugate gradients.
+
+        Points weigh a well-conditioned mass as long as each cell has as many as it was seeded with;
+        where some directions have hardly any mass, what is found in them is what the force excites.
+
+        Args:
+            force: f.
+
+        Returns:
+            Shape ``(num_local_unknowns,)``.
+        """
+        if self._mass_solver is None:
+            self._mass_solver = PETSc.KSP().create(force.comm)
+            self._mass_solver.setOptionsPrefix("hytf_mass_")
+            self._mass_solver.setType(PETSc.KSP.Type.CG)
+            self._mass_solver.getPC().setType(PETSc.PC.Type.JACOBI)
+            self._mass_solver.setTolerances(rtol=_MASS_TOLERANCE, atol=0.0, max_it=_MASS_STEPS)
+        self._mass_solver.setOperators(self._constrained["mass"])
+        x = force.duplicate()
+        self._mass_solver.solve(force, x)
+        values = x.array_r.real.copy()
+        x.destroy()
+        return values
+
+    def expand(self, q: RealArray) -> RealArray:
+        """Nodal field u = T q.
 
         Args:
             q: This rank's unknowns, shape ``(num_local_unknowns,)``.
 
         Returns:
-            Real part at the local nodes, ghosts included, shape
+            At the local nodes, ghosts included, shape
             ``(num_local_nodes, num_components)``.
         """
         unknowns, nodes = self.T.createVecs()
@@ -308,14 +392,35 @@ class Equations:
         return u.x.array.real.reshape(-1, self._domain.num_components).copy()
 
 
+def rock_factors(scene: Scene) -> tuple[complex, complex]:
+    """Complex over real modulus of P and of S waves in the rock below a base.
+
+    Under the causal Maxwell law dashpots are real, ρV: the root of a modulus with memory has no
+    finite memory itself. With a damping ratio of 0.5 % in the rock that is 0.2 % in the motion.
+    """
+    rock, solver = scene.boundary.rock, scene.solver
+    assert rock is not None
+    if solver.complex_modulus == "maxwell":
+        return 1.0, 1.0
+    assert solver.complex_modulus is not None
+    return wave_factors(rock.damping, rock.poisson, solver.complex_modulus, solver.keep)
+
+
 @dataclass(frozen=True)
-class _LineLoads:
-    """Right-hand sides that differ from line to line."""
+class _SideLoads:
+    """Right-hand sides with what comes from beyond the sides."""
 
     equations: Equations
+    loads: list[PETSc.Vec] | AffineLoads
 
     def __len__(self) -> int:
-        return len(self.equations.axes)
+        return len(self.loads)
 
     def __call__(self, line: int) -> Sequence[PETSc.Vec]:
-        return self.equations.loads(line)
+        if isinstance(self.loads, AffineLoads):
+            sides = list(self.loads(line))
+        else:
+            sides = [load.copy() for load in self.loads]
+        for side, load in enumerate(sides):
+            self.equations.add_side_forces(line, side, load)
+        return sides

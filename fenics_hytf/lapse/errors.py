@@ -36,3 +36,20 @@ class EmptyCellError(LapseError):
             f"found {len(cells)} cells without material points, the first: {listed}; expected "
             "points in every cell: partially filled meshes are not in this version"
         )
+
+
+class VolumeError(LapseError):
+    """Points have been squeezed to nothing, or blown up.
+
+    Attributes:
+        points: Their identities.
+    """
+
+    def __init__(self, points: list[int], ratio: float) -> None:
+        self.points = points
+        listed = ", ".join(str(point) for point in points[:5])
+        super().__init__(
+            f"found {len(points)} material points whose volume has become {ratio:.3g} times that "
+            f"at the start, the first: {listed}; expected 0.1 to 10 times: the response is not to "
+            "be trusted; use shorter lapses, or look at the stiffness there"
+        )

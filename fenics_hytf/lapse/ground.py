@@ -8,7 +8,9 @@ input, so that a run on several ranks adds in the same order as a serial one.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +19,7 @@ from fenics_hytf.domain import Domain, distance_to_sides
 from fenics_hytf.lapse.errors import EmptyCellError
 from fenics_hytf.particles import Points, seed
 from fenics_hytf.scene import Scene
-from fenics_hytf.soil import Curve, complex_factor
+from fenics_hytf.soil import Curve
 
 RealArray = npt.NDArray[np.float64]
 
@@ -34,6 +36,8 @@ class Ground:
         damping: Damping ratio without curves [-].
         curves: Curves of each region, ``None`` for a linear soil, shape ``(num_regions,)``.
         absorbing: Damping ratio that an absorbing layer adds [-], or ``None`` without one.
+        degradation: What counted cycles have left of the modulus [-], or ``None`` where nothing
+            degrades.
 
     All but ``curves`` have the shape ``(num_cells,)``.
     """
@@ -45,6 +49,7 @@ class Ground:
     damping: RealArray
     curves: tuple[Curve | None, ...]
     absorbing: RealArray | None = None
+    degradation: RealArray | None = None
 
     @property
     def nonlinear(self) -> npt.NDArray[np.bool_]:
@@ -61,10 +66,13 @@ class Ground:
             Secant modulus and damping of every cell.
         """
         ratio, damping = np.ones_like(self.shear_modulus), self.damping.copy()
+        if self.degradation is not None:
+            ratio = self.degradation.copy()
         for number, curve in enumerate(self.curves):
             if curve is not None:
                 mine = self.region == number
-                ratio[mine], damping[mine] = curve.evaluate(effective_strain[mine])
+                secant, damping[mine] = curve.evaluate(effective_strain[mine])
+                ratio[mine] *= secant
         return Moduli(ratio * self.shear_modulus, damping)
 
 
@@ -83,24 +91,15 @@ class Moduli:
         return np.maximum(modulus, damping)
 
 
-@dataclass(frozen=True)
-class ElasticConstants:
-    """Lamé's λ and the shear modulus of every cell [Pa], shape ``(num_cells,)``."""
-
-    lame_lambda: RealArray
-    shear_modulus: RealArray
-
-    def at(self, cells: npt.NDArray[np.integer]) -> tuple[RealArray, RealArray]:
-        """λ and G of some cells."""
-        return self.lame_lambda[cells], self.shear_modulus[cells]
-
-
-def seed_points(scene: Scene, domain: Domain) -> Points:
+def seed_points(
+    scene: Scene, domain: Domain, carried: Mapping[str, tuple[int, ...]] = MappingProxyType({})
+) -> Points:
     """Fill the cells with points; only what an effect of the scene carries gets an array.
 
     Args:
         scene: The scene.
         domain: The domain.
+        carried: What is carried over seams: shapes of one point's entry by name.
 
     Returns:
         The points of this rank.
@@ -115,7 +114,11 @@ def seed_points(scene: Scene, domain: Domain) -> Points:
         fields += ["stress"]
     density = [scene.soil[name].density for name in domain.region_names]
     count = scene.mesh.points_in(domain.mesh.topology.cell_name())
-    return seed(domain.mesh, domain.regions, density, count, fields)
+    points = seed(domain.mesh, domain.regions, density, count, fields)
+    for name, shape in carried.items():
+        if name not in points.history:
+            points.add(name, shape)
+    return points
 
 
 def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
@@ -166,34 +169,3 @@ def _absorbing_layer(scene: Scene, domain: Domain) -> RealArray | None:
         return None
     distance = distance_to_sides(domain, calm.sides, domain.centroids())
     return calm.damping * np.maximum(1.0 - distance / calm.thickness, 0.0) ** 2
-
-
-def complex_constants(
-    ground: Ground, moduli: Moduli, convention: str, keep: str
-) -> tuple[ElasticConstants, ElasticConstants | None]:
-    """Real and imaginary parts of the elastic constants.
-
-    Args:
-        ground: The ground, for Poisson's ratio and the small-strain bulk modulus.
-        moduli: Secant modulus and damping.
-        convention: Name of the complex modulus.
-        keep: ``"poisson"``: the whole elasticity tensor takes the factor G*/G and G/G_max;
-            ``"bulk"``: only its deviator does.
-
-    Returns:
-        Real parts; imaginary parts for ω > 0, or ``None`` without any damping.
-    """
-    G = moduli.shear_modulus * complex_factor(moduli.damping, convention)
-    nu = ground.poisson
-    if keep == "poisson":
-        lame = G * (2 * nu / (1 - 2 * nu))
-    else:
-        bulk = ground.shear_modulus * 2 * (1 + nu) / (3 * (1 - 2 * nu))
-        lame = bulk - 2 / 3 * G
-    real = ElasticConstants(lame.real, G.real)
-    if ground.absorbing is not None:
-        absorbed = 1 + 2j * ground.absorbing
-        lame, G = lame.real * absorbed + 1j * lame.imag, G.real * absorbed + 1j * G.imag
-    if not np.any(G.imag):
-        return real, None
-    return real, ElasticConstants(lame.imag, G.imag)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.particles import MassLedger
 
 RealArray = npt.NDArray[np.float64]
@@ -36,6 +37,8 @@ class CellState:
             ``(num_cells,)``.
         change: Last change of the equivalent-linear loop [-], nought where the cell is linear,
             shape ``(num_cells,)``.
+        degradation: What counted cycles have left of the modulus in the lapse [-], shape
+            ``(num_cells,)``; ``None`` where nothing degrades.
     """
 
     region: npt.NDArray[np.int32]
@@ -50,6 +53,7 @@ class CellState:
     peak_velocity: RealArray
     peak_displacement: RealArray
     change: RealArray
+    degradation: RealArray | None = None
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,10 @@ class LapseResult:
             ``(num_motions, num_samples)``.
         outcrop: Acceleration of the bare rock likewise, or ``None`` where it is not known.
         cells: Values of the cells.
+        seam_error: Estimate of the error that the hand-over from the lapse before brought: the
+            larger of the jumps of displacement and velocity of the points over their peaks in the
+            cells [-]; ``None`` where nothing was handed over.
+        energy: Energy ledger, or ``None`` under ``steady`` continuity or a law that is not causal.
         ledger: Points and their mass after the lapse's convective phase.
     """
 
@@ -116,4 +124,6 @@ class LapseResult:
     within: RealArray
     outcrop: RealArray | None
     cells: CellState
+    seam_error: float | None
+    energy: Energy | None
     ledger: MassLedger

@@ -1,130 +1,176 @@
 # SPDX-License-Identifier: MIT
-"""From transfer functions to histories: û(ω) = h(ω) ü̂_b(ω) (6), T(ω) = r − ω²h(ω), peaks of cells.
+"""From transfer functions to histories: û(ω) = h(ω) ü̂_b(ω) (6), and what is carried over a seam.
 
-Everything comes from projections of the sweep on rows, a block of cells at a time; a line that was
-not solved counts as zero in the response and in the base acceleration that is added to it.
+Everything comes from projections of the sweep on rows. A line that was not solved counts as zero.
+The start of a response that does not begin at rest is held by start functions (see
+:mod:`fenics_hytf.motion.contour`), so a projection is its lines and its start:
+
+    u(t) = Σ_k c_k φ_k(t) + L⁻¹[U − Σ_k c_k Φ_k](t)
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.frequency import Sweep, share
-from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
-from fenics_hytf.motion import to_time
-from fenics_hytf.operators import (
-    constrained_rows,
-    displacement_rows,
-    split_rows,
-    strain_rows,
-)
-from fenics_hytf.particles import (
-    Sites,
-    cell_centres,
-    gradient_matrices,
-    transfer_matrix,
-)
+from fenics_hytf.frequency import Columns, Sweep
+from fenics_hytf.lapse.excitation import Excitation
+from fenics_hytf.lapse.material import Part
+from fenics_hytf.operators import constrained_rows, displacement_rows
+from fenics_hytf.particles import Sites, transfer_matrix
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
-_BLOCK = 256  # cells whose spectra are held at once
-_AT_ONCE = 64  # blocks whose rows are made at once
-_FEW = 64  # cells whose histories are held at once: they stay in the cache
+
+@dataclass(frozen=True)
+class Spectra:
+    """Some quantities on the lines.
+
+    Attributes:
+        coefficients: Without the start, shape ``(..., num_lines)``.
+        start: c of the start functions, shape ``(..., 4)``, or ``None`` where there is no start.
+    """
+
+    coefficients: ComplexArray
+    start: RealArray | None = None
+
+    def __sub__(self, other: Spectra) -> Spectra:
+        """The difference, as of a motion and that of the base."""
+        start = self.start
+        if start is not None and other.start is not None:
+            start = start - other.start
+        return Spectra(
+            self.coefficients - other.coefficients.astype(self.coefficients.dtype), start
+        )
+
+    def __getitem__(self, some: slice | list[int]) -> Spectra:
+        """Some of the quantities."""
+        return Spectra(self.coefficients[some], None if self.start is None else self.start[some])
+
+    def reshape(self, *shape: int) -> Spectra:
+        """The quantities in another shape."""
+        start = None if self.start is None else self.start.reshape(*shape, self.start.shape[-1])
+        return Spectra(self.coefficients.reshape(*shape, self.coefficients.shape[-1]), start)
 
 
 @dataclass(frozen=True)
-class Excitation:
-    """The input of one lapse at the lines that are solved.
+class Response:
+    """The response of one lapse.
 
     Attributes:
-        lines: Numbers of the solved lines, shape ``(num_lines,)``.
-        weights: Fourier coefficients of the base acceleration [m/s^2], shape
-            ``(num_motions, num_lines)``.
-        axes: Component in which each motion acts.
-        num_samples: Samples of the lapse.
-        dt: Time step [s].
-        excited: Lines above the threshold.
+        sweep: Transfer functions h of each motion (5), and those of what is carried over.
+        excitation: What they are weighed with.
+        start: c of the start functions on this rank's unknowns, or ``None`` without a start.
     """
 
-    lines: npt.NDArray[np.intp]
-    weights: ComplexArray
-    axes: tuple[int, ...]
-    num_samples: int
-    dt: float
-    excited: int
+    sweep: Sweep
+    excitation: Excitation
+    start: Columns | None = None
 
-    @property
-    def frequency(self) -> RealArray:
-        """Of the lines [Hz]."""
-        return self.lines / (self.num_samples * self.dt)
+    def transfer(self, rows: PETSc.Mat) -> ComplexArray:
+        """Transfer functions h of the motions, shape ``(n, num_motions, num_lines)``."""
+        return self.sweep.project(rows)[:, : len(self.excitation.axes)]
 
-    @property
-    def omega(self) -> RealArray:
-        """Circular frequency of the lines [rad/s]."""
-        return 2 * np.pi * self.frequency
-
-    @property
-    def s(self) -> ComplexArray:
-        """Complex frequency iω of the lines [rad/s]."""
-        return np.asarray(1j * self.omega, np.complex128)
-
-    @cached_property
-    def _places(self) -> slice | npt.NDArray[np.intp]:
-        """The lines among all: as a slice where they are neighbours, which is copied faster."""
-        first, last = self.lines[[0, -1]] if len(self.lines) else (0, -1)
-        return slice(first, last + 1) if last + 1 - first == len(self.lines) else self.lines
-
-    def to_time(self, coefficients: ComplexArray) -> RealArray:
-        """Sum the lines at every sample.
+    def spectra(self, rows: PETSc.Mat) -> Spectra:
+        """The response to all that acts, times the rows of a matrix.
 
         Args:
-            coefficients: Shape ``(..., num_lines)``.
+            rows: Matrix with as many columns as there are unknowns.
 
         Returns:
-            Shape ``(..., num_samples)``, of the same precision.
+            This rank's rows.
         """
-        shape = (*coefficients.shape[:-1], self.num_samples // 2 + 1)
-        spectrum = np.zeros(shape, coefficients.dtype)
-        spectrum[..., self._places] = coefficients
-        return to_time(spectrum, self.num_samples)
+        projected = self.sweep.project(rows)
+        return self._without_start(
+            np.einsum("nsk,sk->nk", projected, self.excitation.weights), rows
+        )
 
-    def respond(self, projected: ComplexArray) -> ComplexArray:
-        """Spectra of the response to all motions together (6).
+    def weighed(self) -> Callable[[PETSc.Mat], Spectra]:
+        """Likewise for many matrices: as precise as the sweep, and no more."""
+        response = self.sweep.response(self.excitation.weights)
+        return lambda rows: self._without_start(response(rows), rows)
+
+    def _without_start(self, coefficients: ComplexArray, rows: PETSc.Mat) -> Spectra:
+        if self.start is None:
+            return Spectra(coefficients)
+        c = self.start.seen_by(rows).real
+        held = c @ self.excitation.start_transform
+        return Spectra(coefficients - held.astype(coefficients.dtype), c)
+
+    def history(self, spectra: Spectra, derivative: int = 0) -> RealArray:
+        """Values at every sample of the lapse.
 
         Args:
-            projected: Transfer functions h, shape ``(..., num_motions, num_lines)``.
+            spectra: Of quantities.
+            derivative: Order of the time derivative.
 
         Returns:
-            Shape ``(..., num_lines)``.
+            Shape ``(..., num_samples)``, of the precision of the spectra.
         """
-        return np.einsum("...mk,mk->...k", projected, self.weights)
+        given, values = self.excitation, spectra.coefficients
+        factor = (given.s**derivative).astype(values.dtype)
+        history = given.to_time(values * factor if derivative else values)
+        if spectra.start is not None and given.start is not None:
+            functions = given.start.in_time(given.num_samples, derivative)
+            history += spectra.start.astype(history.dtype) @ functions.astype(history.dtype)
+        return history
 
-    def weights_at(self, time: float) -> ComplexArray:
-        """Weights that sum the solutions h to the response at one instant.
+    def start_through(self, parts: tuple[Part, ...]) -> RealArray:
+        """What the parts of a law make of the start functions.
 
-        Real parts of the sum are the response; lines but the first and the last one of an even
-        number of samples stand for their negative twins as well.
+        Args:
+            parts: The parts.
+
+        Returns:
+            L⁻¹[f_j Φ_k], shape ``(len(parts), 4, num_samples)``.
+        """
+        given = self.excitation
+        assert given.start is not None
+        time = given.dt * np.arange(given.num_samples, dtype=np.float64)
+        found = []
+        for part in parts:
+            if part.relaxation_time is not None:
+                found.append(given.start.remembered(part.relaxation_time, time))
+            elif part.instantaneous == 1.0:
+                found.append(given.start.in_time(given.num_samples))
+            else:
+                factor = np.array([part.function(complex(s)) for s in given.s])
+                found.append(given.to_time(factor * given.start_transform))
+        return np.stack(found)
+
+    def unknowns_at(
+        self, time: float, derivative: int = 0, relaxation_time: float | None = None
+    ) -> RealArray:
+        """All unknowns at one instant.
 
         Args:
             time: After the start of the lapse [s].
+            derivative: Order of the time derivative.
+            relaxation_time: τ of a Maxwell branch, for its memory instead of the motion itself.
 
         Returns:
-            Shape ``(num_motions, num_lines)``.
+            This rank's, shape ``(num_local_unknowns,)``.
         """
-        twice = np.where(self.lines == 0, 1.0, 2.0)
-        if self.num_samples % 2 == 0:
-            twice = np.where(self.lines == self.num_samples // 2, 1.0, twice)
-        return self.weights * (twice / self.num_samples * np.exp(1j * self.omega * time))
+        given = self.excitation
+        factor = given.sum_at(time) * given.s**derivative
+        if relaxation_time is not None:
+            factor = factor * given.s * relaxation_time / (1 + given.s * relaxation_time)
+        values = self.sweep.combine(given.weights * factor).real
+        if self.start is not None:
+            values = (
+                values
+                + (
+                    self.start @ given.start_at(time, derivative, relaxation_time).astype(complex)
+                ).real
+            )
+        return np.asarray(values)
 
 
 @dataclass(frozen=True)
@@ -165,173 +211,51 @@ class ReceiverProbe:
         """Destroy the rows."""
         self._rows.destroy()
 
-    def histories(self, sweep: Sweep, excitation: Excitation, base: ComplexArray) -> Histories:
+    def histories(self, response: Response, base: Spectra) -> Histories:
         """Histories and transfer functions of all receivers, on every rank (collective).
 
         Args:
-            sweep: Transfer functions h.
-            excitation: The input.
-            base: Those of the base, which relative motion is relative to, shape
-                ``(num_components, num_motions, num_lines)``.
+            response: The response.
+            base: Of the base, which relative motion is relative to, ``num_components`` of them.
 
         Returns:
-            The histories.
+            The histories; the displacement is the increment of the lapse.
         """
-        omega = excitation.omega
-        mine = sweep.project(self._rows)
-        # A receiver that no rank holds rode a point that has left the mesh: not a number.
-        h = np.full((self._count, *base.shape), np.nan, complex)
-        for numbers, part in self._domain.comm.allgather((self._numbers, mine)):
-            h[numbers] = part.reshape(len(numbers), *base.shape)
-        transfer = -(omega**2) * h
-        for motion, axis in enumerate(excitation.axes):
+        given, components = response.excitation, self._domain.num_components
+        h = response.transfer(self._rows)
+        count = len(h) // components
+        transfer = given.s**2 * h.reshape(count, components, *h.shape[1:])
+        for motion, axis in enumerate(given.axes):
             transfer[:, axis, motion] += 1.0
-        u, total = excitation.respond(h - base), excitation.respond(transfer)
-        return Histories(
-            transfer,
-            excitation.to_time(u),
-            excitation.to_time(1j * omega * u),
-            excitation.to_time(-(omega**2) * u),
-            excitation.to_time(total),
-        )
+        absolute = response.spectra(self._rows).reshape(count, components)
+        relative = absolute - base
+        total = response.history(absolute, 2)
+        total[:, list(given.axes)] += given.base_acceleration
+        moved = [response.history(relative, derivative) for derivative in range(3)]
+        return Histories(*self._gather(transfer, *moved, total))
 
-
-@dataclass(frozen=True)
-class CellPeaks:
-    """Largest values over the lapse, all cells in the order of the input.
-
-    Attributes:
-        strain: Shear strain [-], shape ``(num_cells,)``.
-        stress: Shear stress [Pa], shape ``(num_cells,)``.
-        acceleration: Norm of the total acceleration [m/s^2], shape ``(num_cells,)``.
-        velocity: Norm of the velocity relative to the base [m/s], shape ``(num_cells,)``.
-        displacement: Norm of the displacement relative to the base [m], shape ``(num_cells,)``.
-    """
-
-    strain: RealArray
-    stress: RealArray
-    acceleration: RealArray
-    velocity: RealArray
-    displacement: RealArray
-
-
-class CellProbe:
-    """Evaluates the response at the centres of cells, a block of them at a time.
-
-    Args:
-        domain: The domain.
-        T: Constraint matrix.
-        convention: Strain measure, see :func:`peak_shear_strain`.
-
-    Groups of ranks with the same cells share out the blocks.
-    """
-
-    def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
-        self._domain, self._convention = domain, convention
-        blocks = domain.comm.allreduce(-(-domain.num_owned_cells // _BLOCK), MPI.MAX)
-        mine = range(blocks)[share(blocks, domain.across)]
-        self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
-        for first in range(mine.start, mine.stop, _AT_ONCE):
-            self._blocks += self._rows(T, range(first, min(first + _AT_ONCE, mine.stop)))
-
-    def _rows(self, T: PETSc.Mat, blocks: range) -> list[tuple[slice, PETSc.Mat, PETSc.Mat]]:
-        """Cells of some blocks, and the rows that evaluate their strain and displacement."""
-        domain, owned = self._domain, self._domain.num_owned_cells
-        bounds = [min(b * _BLOCK, owned) for b in range(blocks.start, blocks.stop + 1)]
-        centres = cell_centres(domain.mesh, bounds[0], bounds[-1])
-        count = domain.num_components
-        parts = []
-        for local in (
-            strain_rows(gradient_matrices(centres, domain.V), count),
-            displacement_rows(transfer_matrix(centres, domain.V), count),
-        ):
-            rows = constrained_rows(domain, local, T)
-            a_cell = local.shape[0] // max(len(centres), 1)
-            parts.append(split_rows(rows, [a_cell * (bound - bounds[0]) for bound in bounds]))
-            rows.destroy()
-        cells = [slice(first, stop) for first, stop in pairwise(bounds)]
-        return list(zip(cells, *parts, strict=True))
-
-    def destroy(self) -> None:
-        """Destroy the rows."""
-        for _, *rows in self._blocks:
-            for row in rows:
-                row.destroy()
-
-    def peak_strain(self, sweep: Sweep, excitation: Excitation) -> RealArray:
-        """Largest shear strain of every cell (collective).
+    def at(self, unknowns: RealArray) -> RealArray:
+        """Displacement of all receivers at one instant (collective).
 
         Args:
-            sweep: Transfer functions h.
-            excitation: The input.
+            unknowns: This rank's unknowns, shape ``(num_local_unknowns,)``.
 
         Returns:
-            All cells in the order of the input [-], shape ``(num_cells,)``.
+            Shape ``(num_receivers, num_components)``.
         """
-        peak = np.zeros((self._domain.num_owned_cells, 1))
-        response = sweep.response(excitation.weights)
-        for cells, strain, _ in self._blocks:
-            for some, spectra in _by_few(cells, response(strain)):
-                peak[some, 0] = peak_shear_strain(excitation.to_time(spectra), self._convention)
-        return self._gather(peak)[:, 0]
+        x, there = self._rows.createVecs()
+        x.array[:] = unknowns
+        self._rows.mult(x, there)
+        mine = there.array_r.real.reshape(-1, self._domain.num_components).copy()
+        x.destroy()
+        there.destroy()
+        return np.asarray(self._gather(mine)[0])
 
-    def peaks(
-        self, sweep: Sweep, excitation: Excitation, modulus: ComplexArray, base: ComplexArray
-    ) -> CellPeaks:
-        """Largest strain, stress and motion of every cell (collective).
-
-        Args:
-            sweep: Transfer functions h.
-            excitation: The input.
-            modulus: Complex shear modulus G* of every cell [Pa], shape ``(num_cells,)``.
-            base: Transfer functions of the base, which relative motion is relative to, shape
-                ``(num_components, num_motions, num_lines)``.
-
-        Returns:
-            The peaks.
-        """
-        domain = self._domain
-        mine = modulus[domain.input_cells[: domain.num_owned_cells]]
-        peak = np.zeros((domain.num_owned_cells, 5))
-        at_rest = excitation.omega == 0
-        still = excitation.respond(base)
-        response = sweep.response(excitation.weights)
-        for cells, strain, place in self._blocks:
-            for some, spectra in _by_few(cells, response(strain)):
-                # G* is real at ω = 0.
-                factor = np.where(at_rest, mine[some, None].real, mine[some, None])[:, None, :]
-                for column, values in enumerate((spectra, factor.astype(spectra.dtype) * spectra)):
-                    history = excitation.to_time(values)
-                    peak[some, column] = peak_shear_strain(history, self._convention)
-            for some, u in _by_few(cells, response(place)):
-                for column, values in enumerate(_motions(u, still, excitation), start=2):
-                    peak[some, column] = peak_length(excitation.to_time(values))
-        return CellPeaks(*self._gather(peak).T)
-
-    def _gather(self, peak: RealArray) -> RealArray:
-        """All cells in the order of the input, from the ranks that looked at them."""
-        if self._domain.across.size > 1:
-            self._domain.across.Allreduce(MPI.IN_PLACE, peak, MPI.MAX)
-        return self._domain.gather_cells(peak)
-
-
-def _by_few(cells: slice, spectra: ComplexArray) -> Iterator[tuple[slice, ComplexArray]]:
-    """Rows of a block, a few cells at a time, shape ``(num_cells, num_values, num_lines)``."""
-    count = cells.stop - cells.start
-    if count:
-        by_cell = spectra.reshape(count, len(spectra) // count, spectra.shape[-1])
-        for first in range(0, count, _FEW):
-            stop = min(first + _FEW, count)
-            yield slice(cells.start + first, cells.start + stop), by_cell[first:stop]
-
-
-def _motions(
-    u: ComplexArray, still: ComplexArray, excitation: Excitation
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Spectra of total acceleration, relative velocity and relative displacement."""
-    given = np.zeros_like(still)
-    for motion, axis in enumerate(excitation.axes):
-        given[axis] += excitation.weights[motion]
-    s = excitation.s.astype(u.dtype)
-    relative = u - still.astype(u.dtype)
-    return s * s * u + given.astype(u.dtype), s * relative, relative
+    def _gather(self, *mine: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:
+        """Of all receivers, from the ranks that hold them."""
+        # A receiver that no rank holds rode a point that has left the mesh: not a number.
+        every = [np.full((self._count, *part.shape[1:]), np.nan, part.dtype) for part in mine]
+        for numbers, parts in self._domain.comm.allgather((self._numbers, mine)):
+            for values, part in zip(every, parts, strict=True):
+                values[numbers] = part
+        return every

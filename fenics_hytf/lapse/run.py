@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""One lapse: the input at its lines, sweeps with given moduli, and the equivalent-linear loop."""
+"""One lapse: sweeps with given moduli, and the equivalent-linear loop round them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from petsc4py import PETSc
 
-from fenics_hytf.frequency import Sweep, direct_sweep, reduced_sweep
+from fenics_hytf.frequency import DynamicSystem, Loads, Sweep, direct_sweep, reduced_sweep
+from fenics_hytf.lapse.cells import CellProbe
+from fenics_hytf.lapse.continuity import Continuity
 from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.equivalent_linear import iterate
-from fenics_hytf.lapse.ground import ElasticConstants, Ground, Moduli, complex_constants
+from fenics_hytf.lapse.excitation import Excitation
+from fenics_hytf.lapse.ground import Ground, Moduli
+from fenics_hytf.lapse.material import Material, material
 from fenics_hytf.lapse.records import LoopHistory
-from fenics_hytf.lapse.response import CellProbe, Excitation
-from fenics_hytf.motion import excited_lines, to_frequency
+from fenics_hytf.lapse.response import Response
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
@@ -26,6 +30,7 @@ _LOOSEST = 1e-2  # residual of a sweep that only tells the loop where to go
 _BLOCK = {2: 14, 3: 24}
 _IN_REACH = 1e-10  # residual that round-off leaves in reach of every reduced sweep
 _SHARE = 1e-2  # of the last change of the moduli, as a residual
+_BEFORE_GROWTH = 0.1  # e^{−ηT}: on a damped contour the error grows by e^{ηT} within a lapse
 
 
 @dataclass
@@ -56,41 +61,25 @@ class Solved:
     """The solution of a lapse.
 
     Attributes:
-        excitation: The input at the solved lines.
-        sweep: Transfer functions h(ω) of each motion (5).
+        response: The response.
         moduli: Moduli it was solved with.
-        constants: Real elastic constants it was solved with.
+        material: The law that they made.
         effective_strain: Of every cell [-], or ``None`` without the equivalent-linear loop.
         loop: History of the loop.
         tally: Factorisations and solves.
     """
 
-    excitation: Excitation
-    sweep: Sweep
+    response: Response
     moduli: Moduli
-    constants: ElasticConstants
+    material: Material
     effective_strain: RealArray | None
     loop: LoopHistory
     tally: Tally = field(default_factory=Tally)
 
-
-def excite(scene: Scene, acceleration: RealArray, axes: tuple[int, ...]) -> Excitation:
-    """Find the lines of a lapse that carry energy.
-
-    Args:
-        scene: The scene: thresholds and time step.
-        acceleration: Base acceleration in the lapse [m/s^2], shape ``(num_motions, num_samples)``.
-        axes: Component in which each motion acts.
-
-    Returns:
-        The input at those lines.
-    """
-    spectra = to_frequency(acceleration)
-    num_samples = acceleration.shape[1]
-    limits = (scene.solver.excited, scene.solver.max_frequency)
-    lines = excited_lines(spectra, scene.dt, num_samples, *limits)
-    everywhere = excited_lines(spectra, scene.dt, num_samples, scene.solver.excited)
-    return Excitation(lines, spectra[:, lines], axes, num_samples, scene.dt, len(everywhere))
+    @property
+    def excitation(self) -> Excitation:
+        """The input at the solved lines."""
+        return self.response.excitation
 
 
 def solve(
@@ -98,6 +87,7 @@ def solve(
     equations: Equations,
     ground: Ground,
     excitation: Excitation,
+    continuity: Continuity,
     probe: CellProbe,
     start: RealArray,
     observer: Observer,
@@ -110,6 +100,7 @@ def solve(
         equations: The equations, their mass weighed and their stress carried.
         ground: The ground.
         excitation: The input.
+        continuity: How the lapse hangs together with the one before; it has begun the lapse.
         probe: Evaluates strain in the cells.
         start: First effective strain of every cell [-], shape ``(num_cells,)``.
         observer: Where to report.
@@ -122,12 +113,12 @@ def solve(
         SweepError: A line cannot be solved.
         EquivalentLinearError: The loop reaches its limit.
     """
-    sweeps = _Sweeps(scene, equations, ground, excitation, observer)
+    sweeps = _Sweeps(scene, equations, ground, excitation, continuity, observer)
 
     def peak_strain(moduli: Moduli, iteration: int) -> RealArray:
-        sweep = sweeps.solve(moduli, iteration, sweeps.tolerance_so_far)
+        response, law = sweeps.solve(moduli, iteration, sweeps.tolerance_so_far)
         with observer.phase("response"):
-            return probe.peak_strain(sweep, excitation)
+            return probe.peak_strain(response, continuity.carried(law))
 
     effective, loop = None, LoopHistory()
     if scene.effects.equivalent_linear is None:
@@ -145,8 +136,8 @@ def solve(
         if sweeps.tolerance > sweeps.finest:
             sweeps.solve(moduli, len(loop.change))
     assert sweeps.last is not None
-    constants, sweep = sweeps.constants, sweeps.last
-    return Solved(excitation, sweep, moduli, constants, effective, loop, sweeps.tally)
+    response, law = sweeps.last
+    return Solved(response, moduli, law, effective, loop, sweeps.tally)
 
 
 class _Sweeps:
@@ -158,10 +149,11 @@ class _Sweeps:
         equations: Equations,
         ground: Ground,
         excitation: Excitation,
+        continuity: Continuity,
         observer: Observer,
     ) -> None:
         self._solver, self._equations, self._ground = scene.solver, equations, ground
-        self._excitation, self._observer = excitation, observer
+        self._excitation, self._continuity, self._observer = excitation, continuity, observer
         self._change = 1.0
         self._expansions: tuple[int, ...] = ()
         self.tally = Tally()
@@ -170,8 +162,10 @@ class _Sweeps:
         if loop is not None:  # what the strain is off by must not keep the loop from its end
             needed = max(_SHARE * loop.tolerance, _IN_REACH)
             self.finest = min(self.finest, needed)
+        self._growth = _BEFORE_GROWTH if excitation.eta else 1.0
+        self.finest = max(self._growth * self.finest, min(self.finest, _IN_REACH))
         self.tolerance = self.finest
-        self.last: Sweep | None = None
+        self.last: tuple[Response, Material] | None = None
 
     def iterated(self, iteration: int, change: float) -> None:
         """Take note of the change of an iteration, and pass it on."""
@@ -181,10 +175,12 @@ class _Sweeps:
     @property
     def tolerance_so_far(self) -> float:
         """What an iteration needs: a hundredth of what the moduli still change by."""
-        return max(self.finest, min(_LOOSEST, _SHARE * self._change))
+        return max(self.finest, self._growth * min(_LOOSEST, _SHARE * self._change))
 
-    def solve(self, moduli: Moduli, iteration: int, tolerance: float | None = None) -> Sweep:
-        """Sweep with some moduli.
+    def solve(
+        self, moduli: Moduli, iteration: int, tolerance: float | None = None
+    ) -> tuple[Response, Material]:
+        """Solve the lapse with some moduli.
 
         Args:
             moduli: The moduli.
@@ -193,34 +189,47 @@ class _Sweeps:
                 end of its loop needs. A direct sweep is as good as it is.
 
         Returns:
-            The sweep.
+            The response, and the law of the moduli.
         """
-        solver, excitation = self._solver, self._excitation
         with self._observer.phase("assembly"):
-            parts = complex_constants(self._ground, moduli, solver.complex_modulus, solver.keep)
-            lapse = self._equations.assemble(self._ground, *parts)
+            law = material(self._ground, moduli, self._solver)
+            lapse = self._equations.assemble(self._ground, law)
+
+        def sweep(loads: Sequence[PETSc.Vec] | Loads) -> Sweep:
+            return self._sweep(lapse.system, loads, iteration, tolerance)
+
         with self._observer.phase("sweep"):
-            arguments = lapse.system, lapse.loads, excitation.s
-            across = self._equations.across
+            self.last = self._continuity.respond(sweep, lapse, law), law
+        return self.last
 
-            def report(done: int, total: int) -> None:
-                self._observer.sweeping(iteration, done, total)
+    def _sweep(
+        self,
+        system: DynamicSystem,
+        loads: Sequence[PETSc.Vec] | Loads,
+        iteration: int,
+        tolerance: float | None,
+    ) -> Sweep:
+        """Sweep a system over the lines of the lapse."""
+        arguments = system, loads, self._excitation.s
+        across = self._equations.across
 
-            sweep: Sweep
-            if solver.sweep == "direct":
-                sweep = direct_sweep(*arguments, solver.tolerance, report, across)
-            else:
-                self.tolerance = self.finest if tolerance is None else tolerance
-                reduced = reduced_sweep(
-                    *arguments,
-                    self.tolerance,
-                    report,
-                    self._expansions,
-                    block=_BLOCK[self._equations.gdim],
-                    across=across,
-                )
-                self._expansions, sweep = reduced.expansions, reduced
-        self.last, self.constants = sweep, parts[0]
+        def report(done: int, total: int) -> None:
+            self._observer.sweeping(iteration, done, total)
+
+        sweep: Sweep
+        if self._solver.sweep == "direct":
+            sweep = direct_sweep(*arguments, self._solver.tolerance, report, across)
+        else:
+            self.tolerance = self.finest if tolerance is None else tolerance
+            reduced = reduced_sweep(
+                *arguments,
+                self.tolerance,
+                report,
+                self._expansions,
+                block=_BLOCK[self._equations.gdim],
+                across=across,
+            )
+            self._expansions, sweep = reduced.expansions, reduced
         self.tally.factorisations += sweep.factorisations
         self.tally.solves += sweep.solves
         return sweep

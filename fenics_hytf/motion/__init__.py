@@ -1,6 +1,14 @@
 # SPDX-License-Identifier: MIT
 """Ground motion: records, lapses, transforms, spectra and intensity. Knows no mesh and no MPI."""
 
+from fenics_hytf.motion.contour import (
+    Contour,
+    LapseRecord,
+    StartFunctions,
+    band_limited,
+    dominant_frequency,
+    energy_band,
+)
 from fenics_hytf.motion.formats import read, read_at2, read_csv
 from fenics_hytf.motion.fourier import fourier_amplitude, smoothed
 from fenics_hytf.motion.intensity import (
@@ -20,13 +28,19 @@ from fenics_hytf.motion.writers import write_at2, write_columns, write_csv
 
 __all__ = [
     "GRAVITY",
+    "Contour",
     "Intensity",
+    "LapseRecord",
     "Record",
     "RecordError",
     "Segment",
+    "StartFunctions",
     "arias_intensity",
+    "band_limited",
     "cumulative_absolute_velocity",
     "default_periods",
+    "dominant_frequency",
+    "energy_band",
     "excited_lines",
     "fourier_amplitude",
     "frequencies",

@@ -2,6 +2,7 @@
 """Stiffness, mass and damping matrices, and evaluation at sites as matrices."""
 
 from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
+from fenics_hytf.operators.forces import InternalForce, isotropic_stress
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
 from fenics_hytf.operators.rows import (
@@ -15,11 +16,13 @@ __all__ = [
     "DashpotForm",
     "ElasticForm",
     "GeometricForm",
+    "InternalForce",
     "TractionForm",
     "assemble_mass",
     "boundary_area",
     "constrained_rows",
     "displacement_rows",
+    "isotropic_stress",
     "mean_rows",
     "rayleigh_damping",
     "split_rows",

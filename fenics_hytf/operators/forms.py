@@ -92,7 +92,13 @@ class GeometricForm:
         matrix.assemble()
 
 
+def quadrature_degree(domain: Domain) -> int:
+    """Of the rule that the stiffness is integrated with: degree + 1 Gauss points a direction.
+
+    It integrates the stiffness of a parallelogram exactly.
+    """
+    return int(2 * domain.V.ufl_element().degree)
+
+
 def _dx(domain: Domain) -> ufl.Measure:
-    # Gauss points that integrate the stiffness of a parallelogram exactly: degree + 1 a direction.
-    degree = 2 * domain.V.ufl_element().degree
-    return ufl.dx(domain.mesh, metadata={"quadrature_degree": degree})
+    return ufl.dx(domain.mesh, metadata={"quadrature_degree": quadrature_degree(domain)})

@@ -5,6 +5,7 @@ The soil's mass is carried by points that weigh on the nodes through M = S^T M_p
 lapses they move through the mesh, which stays, and are found again by Newton's method (7)-(9).
 """
 
+from fenics_hytf.particles.geometry import cell_grid
 from fenics_hytf.particles.kinematics import (
     to_components,
     to_tensor,
@@ -16,8 +17,10 @@ from fenics_hytf.particles.ledger import MassLedger
 from fenics_hytf.particles.mapping import inverse_map
 from fenics_hytf.particles.move import MoveReport, PointsNotFinite, PointsOutside, move
 from fenics_hytf.particles.points import Points, quadrature_rule, seed
+from fenics_hytf.particles.resample import resample_matrix
 from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
 from fenics_hytf.particles.sites import Located, Sites, cell_centres
+from fenics_hytf.particles.store import gather_points, scatter_points
 from fenics_hytf.particles.transfer import (
     gradient_matrices,
     particle_mass_matrix,
@@ -35,14 +38,18 @@ __all__ = [
     "PointsOutside",
     "Sites",
     "cell_centres",
+    "cell_grid",
     "default_points_per_cell",
+    "gather_points",
     "gradient_matrices",
     "inverse_map",
     "locate",
     "move",
     "particle_mass_matrix",
     "quadrature_rule",
+    "resample_matrix",
     "resolve_owners",
+    "scatter_points",
     "seed",
     "to_components",
     "to_tensor",

@@ -7,7 +7,8 @@ With the increment's gradient at a point, L = grad(du), constant over the lapse'
     stress <- dF (stress + lambda tr(d) I + 2 G d) dF^T / det dF.
 
 A rotation (L skew) makes dF orthogonal: it changes neither a volume nor an invariant, where I + L
-and the midpoint rule would. The stress update's tangent is K_L + K_NL. Tensors of two-dimensional
+and the midpoint rule would. The stress update's tangent is K_L + K_NL. What lapses hand over of the
+dynamic strain, memory and stress is turned by exp(skew L). Tensors of two-dimensional
 points are the in-plane ones; the third stretch is 1 and does not mix with them.
 """
 
@@ -22,6 +23,11 @@ from fenics_hytf.particles.points import Points
 
 # Where the components xx, yy(, zz, yz, xz), xy stand in the tensor.
 _PLACES = {3: ((0, 1, 0), (0, 1, 1)), 6: ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1))}
+
+
+# Tensors that change within lapses and only turn with the ground between them, and what a shear
+# component stands for: γ = 2ε in strain.
+_TURNING = {"dynamic_strain": 2.0, "memory_strain": 2.0, "dynamic_stress": 1.0}
 
 
 def to_tensor(components: RealArray) -> RealArray:
@@ -58,6 +64,31 @@ def update_volume(volume: RealArray, gradient: RealArray) -> RealArray:
         ``volume exp(tr L)``, shape ``(n,)``.
     """
     return volume * np.exp(np.trace(gradient, axis1=1, axis2=2))
+
+
+def rotate(columns: RealArray, gradient: RealArray, shear: float) -> RealArray:
+    """Symmetric tensors turned with the ground, R T Rᵀ with R = exp(skew L).
+
+    Args:
+        columns: Components as ``to_tensor`` takes them, shape ``(n, ..., 3)`` or ``(n, ..., 6)``.
+        gradient: L [-], shape ``(n, gdim, gdim)``.
+        shear: What an off-diagonal component is in the columns: 1, or 2 for strain as γ = 2ε.
+
+    Returns:
+        Components, shaped like ``columns``.
+    """
+    turned = np.empty_like(columns)
+    scale = np.ones(columns.shape[-1])
+    scale[gradient.shape[1] :] = shear
+    for chunk in chunks(len(columns)):
+        L = gradient[chunk]
+        R = expm(0.5 * (L - L.transpose(0, 2, 1)))
+        inner = int(np.prod(columns.shape[1:-1], dtype=int))
+        flat = (columns[chunk] / scale).reshape(-1, len(scale))
+        many = np.repeat(R, inner, axis=0)
+        tensors = many @ to_tensor(flat) @ many.transpose(0, 2, 1)
+        turned[chunk] = (to_components(tensors) * scale).reshape(columns[chunk].shape)
+    return turned
 
 
 def update_stress(
@@ -121,4 +152,7 @@ def update_kinematics(
     if "strain" in points.history:
         symmetric = 0.5 * (gradient + gradient.transpose(0, 2, 1))
         points["strain"] = points["strain"] + to_components(symmetric)
+    for name, shear in _TURNING.items():
+        if name in points.history:
+            points[name] = rotate(points[name], gradient, shear)
     points.volume = update_volume(points.volume, gradient)

@@ -8,6 +8,7 @@ each with its key, what was found and what was expected. How anything is solved 
 from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
+from fenics_hytf.scene.identity import changed_keys, identity
 from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh, components_of
 from fenics_hytf.scene.motion import MotionInput, direction_fault
 from fenics_hytf.scene.quadrature import (
@@ -19,6 +20,7 @@ from fenics_hytf.scene.regions import Region
 from fenics_hytf.scene.scene import Scene, examine
 from fenics_hytf.scene.settings import (
     Calm,
+    Degradation,
     Effects,
     EquivalentLinear,
     Lapses,
@@ -35,6 +37,7 @@ __all__ = [
     "Box",
     "Calm",
     "Column",
+    "Degradation",
     "Effects",
     "EquivalentLinear",
     "Fault",
@@ -54,11 +57,13 @@ __all__ = [
     "Soil",
     "Solver",
     "allowed_points_per_cell",
+    "changed_keys",
     "check",
     "components_of",
     "default_kind",
     "default_points_per_cell",
     "direction_fault",
     "examine",
+    "identity",
     "rule_degrees",
 ]

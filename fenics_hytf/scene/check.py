@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,15 @@ from fenics_hytf.scene.boundary import (
     outcrop_rules,
     read_boundary,
 )
-from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
+from fenics_hytf.scene.continuity import continuity_rules, resolve
+from fenics_hytf.scene.faults import (
+    NOT_YET,
+    Fault,
+    fault_from,
+    join_key,
+    name_key,
+    toml_text,
+)
 from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
 from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
 from fenics_hytf.scene.settings import (
@@ -108,8 +117,10 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         faults += _base_rules(raw, sections)
         faults += _antiplane_rules(raw)
         faults += _calm_rules(raw, sections)
+        faults += _degradation_rules(sections)
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
+        faults += _settle_continuity(raw, sections)
     order = {name: i for i, name in enumerate(SECTIONS)}
     faults.sort(key=lambda fault: order.get(fault.key.split(".")[0].split("[")[0], -1))
     return sections, faults
@@ -210,6 +221,38 @@ def _calm_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
             yield Fault(where, toml_text(side), ", ".join(sides) or "a side")
 
 
+def _degradation_rules(sections: Sections) -> Iterator[Fault]:
+    """Degradation of soils that there are, between lapses, by the package that counts cycles."""
+    effect = sections.effects.degradation if sections.effects is not None else None
+    if effect is None:
+        return
+    key, soils = "effects.degradation", sections.soil
+    if find_spec("rainflow") is None:
+        expected = "it to be installed, as cycles are counted with it; run 'pip install rainflow'"
+        yield Fault(key, "no package rainflow", expected)
+    if _num_lapses(sections) == 1:
+        yield Fault(key, "one lapse", "more than one lapse: degradation acts between lapses")
+    for i, name in enumerate(effect.soils or ()):
+        if soils and name not in soils:
+            expected = f"one of the soils {', '.join(map(name_key, soils))}"
+            yield Fault(join_key(key, "soils", i), toml_text(name), expected)
+
+
+def _num_lapses(sections: Sections) -> int | None:
+    """Number of lapses, or ``None`` where it is not known or there is a fault."""
+    lapses = sections.lapses
+    if lapses is None or lapses.duration is None:
+        return None if lapses is None else lapses.count
+    records = [motion.record for motion in sections.motion if motion is not None]
+    if not records:
+        return None
+    try:
+        longest = max(record.num_samples for record in records)
+        return len(split(longest, records[0].dt, duration=lapses.duration))
+    except (ValueError, OverflowError):  # a fault of its own
+        return None
+
+
 def _antiplane_rules(raw: dict[str, Any]) -> Iterator[Fault]:
     """A section that moves across its plane stays in it."""
     mesh, effects = raw.get("mesh"), raw.get("effects")
@@ -236,6 +279,34 @@ def _time_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     if highest is not None and highest > nyquist * (1 + 1e-9):
         expected = f"at most {nyquist:g} Hz, the Nyquist frequency of the motion"
         yield Fault("solver.max_frequency", toml_text(solver["max_frequency"]), expected)
+
+
+def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
+    """What lapses hand over, once they and the motions are known."""
+    motions = tuple(motion for motion in sections.motion if motion is not None)
+    lapses, solver = sections.lapses, sections.solver
+    if lapses is None or solver is None or not motions or len(motions) < len(sections.motion):
+        return
+    dt = motions[0].record.dt
+    if any(abs(motion.record.dt - dt) > 1e-9 * dt for motion in motions):  # a fault of its own
+        return
+    longest = max(motion.record.num_samples for motion in motions)
+    try:
+        segments = split(longest, dt, lapses.count, lapses.duration)
+    except (ValueError, OverflowError):  # a fault of its own
+        return
+    lapses, solver = resolve(raw, lapses, solver, motions, segments)
+    sections.lapses, sections.solver = lapses, solver
+    yield from continuity_rules(raw, lapses, solver, motions, segments)
+    handed_over = lapses.continuity == "transient" and len(segments) > 1
+    if handed_over and solver.complex_modulus != "maxwell" and sections.boundary is not None:
+        for name, kind in sections.boundary.kinds.items():
+            if kind == "free_field":
+                expected = (
+                    f"{NOT_YET} with several transient lapses under a law that is not causal; "
+                    'solver.complex_modulus = "maxwell" or lapses.continuity = "steady" is'
+                )
+                yield Fault(join_key("boundary", name_key(name)), toml_text(kind), expected)
 
 
 def _lapse_rules(lapses: Lapses, num_samples: int, dt: float) -> Iterator[Fault]:

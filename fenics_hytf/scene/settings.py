@@ -21,6 +21,7 @@ from fenics_hytf.scene.table import (
     number,
     read_table,
 )
+from fenics_hytf.soil import DegradationLaw
 
 _RECEIVER_NAME = re.compile(r"[\w-]+")
 
@@ -31,16 +32,16 @@ class Lapses(Table):
     Attributes:
         count: Number of lapses, or ``None`` where ``duration`` is given.
         duration: Length of a lapse [s], or ``None``.
-        continuity: ``steady``: each lapse is its own periodic steady state.
+        continuity: ``transient``: displacement, velocity and stress go on from lapse to lapse;
+            ``steady``: each lapse is its own periodic steady state. Where none is named,
+            ``transient`` for several lapses under anything but pure harmonics.
     """
 
     count: Count | None = Field(None, description="a whole number from 1")
     duration: Positive | None = Field(None, description="a positive time [s]")
-    continuity: Literal["steady"] = Field("steady", description='"steady"')
-
-    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "continuity": {"transient": '"steady" is'}
-    }
+    continuity: Literal["steady", "transient"] = Field(
+        "steady", description='"steady" or "transient"'
+    )
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -119,7 +120,39 @@ class Calm(Table):
     damping: Positive = Field(0.5, description="a positive damping ratio [-]")
 
 
-_THIS_EFFECTS = "equivalent_linear, rayleigh, geometric_stiffness, convection and calm are"
+class Degradation(Table):
+    """Shear modulus lowered from lapse to lapse by the cycles that the soil went through.
+
+    See :mod:`fenics_hytf.soil.degradation`. ``true`` is the clay that its defaults are for.
+
+    Attributes:
+        threshold: Shear strain amplitude up to which nothing degrades [-].
+        s: s of t = s (γ - γ_tv)^r, for strains in percent, as it is published [-].
+        r: r of it [-].
+        minimum: The modulus never falls below this part of the undegraded one [-].
+        soils: Names of the soils that degrade, or ``None``: all of them.
+    """
+
+    threshold: Annotated[float, Field(gt=0, lt=0.1)] = Field(
+        DegradationLaw.threshold,
+        description="a shear strain above 0 and below 0.1 [-], not in percent",
+    )
+    s: Positive = Field(DegradationLaw.s, description="a positive number, for strains in percent")
+    r: Positive = Field(DegradationLaw.r, description="a positive number [-]")
+    minimum: Annotated[float, Field(gt=0, lt=1)] = Field(
+        DegradationLaw.minimum, description="a number between 0 and 1 [-]"
+    )
+    soils: Several[Name] | None = Field(None, min_length=1, description="names of soils")
+
+    @property
+    def law(self) -> DegradationLaw:
+        """The law with these parameters."""
+        return DegradationLaw(self.threshold, self.s, self.r, self.minimum)
+
+
+_THIS_EFFECTS = (
+    "equivalent_linear, rayleigh, geometric_stiffness, convection, degradation and calm are"
+)
 
 
 class Effects(Table):
@@ -130,6 +163,7 @@ class Effects(Table):
         rayleigh: Its factors, or ``None``.
         geometric_stiffness: Stiffness from the stress that the points carry.
         convection: Points move between lapses.
+        degradation: Its parameters, or ``None``.
         calm: The absorbing layer, or ``None``.
     """
 
@@ -137,10 +171,11 @@ class Effects(Table):
     rayleigh: Rayleigh | None = Field(None, description="a table with alpha and beta, or false")
     geometric_stiffness: bool = Field(False, description="true or false")
     convection: bool = Field(False, description="true or false")
+    degradation: Degradation | None = Field(None, description="a table, true or false")
     calm: Calm | None = Field(None, description="a table with sides, thickness and damping")
 
     later: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("gravity", "sliding", "softening", "degradation", "locking", "k0"), _THIS_EFFECTS
+        ("gravity", "sliding", "softening", "locking", "k0"), _THIS_EFFECTS
     )
 
     @classmethod
@@ -159,6 +194,8 @@ class Effects(Table):
             raw["equivalent_linear"] = {} if loop else None
         elif isinstance(loop, dict):
             raw["equivalent_linear"] = EquivalentLinear.prepare(loop)
+        if isinstance(raw.get("degradation"), bool):
+            raw["degradation"] = {} if raw["degradation"] else None
         factors = (
             [rayleigh.get(n, 0.0) for n in Rayleigh.model_fields]
             if (isinstance(rayleigh, dict) and set(rayleigh) <= set(Rayleigh.model_fields))
@@ -193,32 +230,29 @@ class Solver(Table):
 
     Attributes:
         sweep: ``direct``: one factorisation a line; ``reduced``: projected on a few directions.
-        complex_modulus: Convention of the complex modulus.
+        complex_modulus: Convention of the complex modulus; where none is named the causal
+            ``maxwell`` for several transient lapses, else ``hysteretic``.
         keep: ``poisson``: the whole elasticity tensor is complex; ``bulk``: its deviator only.
+        reference_frequency: At which the modulus of ``maxwell`` is the soil's G [Hz]; the dominant
+            frequency of the motion where none is given. ``None`` for the other conventions.
         tolerance: Relative residual on every excited line [-].
         max_frequency: Highest line solved [Hz]; ``None`` for the Nyquist frequency.
         excited: A line is excited above this fraction of the spectral peak [-].
     """
 
     sweep: Literal["direct", "reduced"] = Field("reduced", description='"direct" or "reduced"')
-    complex_modulus: Literal["hysteretic", "kramer", "shake91", "dormieux"] = Field(
-        "hysteretic", description='"hysteretic", "kramer", "shake91" or "dormieux"'
+    complex_modulus: Literal["hysteretic", "kramer", "shake91", "dormieux", "maxwell"] = Field(
+        "hysteretic", description='"hysteretic", "kramer", "shake91", "dormieux" or "maxwell"'
     )
     keep: Literal["poisson", "bulk"] = Field("poisson", description='"poisson" or "bulk"')
     tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
         1e-6, description="a number between 0 and 1 [-]"
     )
+    reference_frequency: Positive | None = Field(None, description="a positive number [Hz]")
     max_frequency: Positive | None = Field(None, description="a positive number [Hz]")
     excited: Annotated[float, Field(ge=0, lt=1)] = Field(
         1e-8, description="a number from 0 to below 1 [-]"
     )
-
-    later: ClassVar[Mapping[str, str]] = {
-        "reference_frequency": 'it belongs to complex_modulus = "maxwell"'
-    }
-    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "complex_modulus": {"maxwell": "hysteretic, kramer, shake91 and dormieux are"},
-    }
 
 
 class Receiver(Table):

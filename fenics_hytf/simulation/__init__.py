@@ -2,7 +2,9 @@
 """The outer loop over lapses, and what it leaves behind."""
 
 from fenics_hytf.simulation.check import mesh_faults
-from fenics_hytf.simulation.errors import SimulationError
+from fenics_hytf.simulation.checkpoint import Checkpoint
+from fenics_hytf.simulation.checkpoint_folder import CheckpointFolder
+from fenics_hytf.simulation.errors import CheckpointError, SimulationError
 from fenics_hytf.simulation.flow import simulate
 from fenics_hytf.simulation.groups import group_faults
 from fenics_hytf.simulation.inspection import Inspection, inspect
@@ -15,12 +17,17 @@ from fenics_hytf.simulation.records import (
     SnapshotCallback,
     Work,
 )
+from fenics_hytf.simulation.scheme import Scheme, scheme_of
 
 __all__ = [
+    "Checkpoint",
+    "CheckpointError",
+    "CheckpointFolder",
     "Inspection",
     "Progress",
     "ProgressCallback",
     "Result",
+    "Scheme",
     "SimulationError",
     "Snapshot",
     "SnapshotCallback",
@@ -29,5 +36,6 @@ __all__ = [
     "inspect",
     "mesh_faults",
     "peak_memory",
+    "scheme_of",
     "simulate",
 ]

@@ -18,3 +18,7 @@ class SimulationError(RuntimeError):
         self.lapse = lapse
         self.partial = partial
         super().__init__(f"lapse {lapse}: {reason}")
+
+
+class CheckpointError(RuntimeError):
+    """A checkpoint could not be written or read; ``str()`` says which, why, and what to do."""

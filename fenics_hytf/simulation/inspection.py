@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
 from mpi4py import MPI
 
 from fenics_hytf.domain import constraint_matrix
 from fenics_hytf.lapse import excite, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
+from fenics_hytf.simulation.scheme import Scheme, scheme_of
+from fenics_hytf.soil import HELD_DAMPING, RELAXATION_TIMES
 
 # Entries of an LDLᵀ factor a row, from nested dissection: 2D c n log2 n (measured 7.6 M entries on
 # 81 002 unknowns, so c = 5.8), 3D c n^(4/3) (PORD on 41 k unknowns, so c = 1).
@@ -33,6 +37,8 @@ class Inspection:
         points: Material points.
         lapses: Number of lapses.
         samples_per_lapse: Samples in each.
+        continuity: Which continuity, what it solves, and why it is this one.
+        complex_modulus: Which convention, and why.
         lines: Lines solved in each lapse.
         factorisations: Factorisations expected, those of free-field columns among them; with the
             equivalent-linear loop the most there can be.
@@ -47,6 +53,8 @@ class Inspection:
     points: int
     lapses: int
     samples_per_lapse: int
+    continuity: str
+    complex_modulus: str
     lines: tuple[int, ...]
     factorisations: int
     shared_bytes: int
@@ -77,23 +85,26 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         SceneError: A fault that only the mesh shows.
     """
     domain = checked_domain(scene, comm)
-    points = seed_points(scene, domain)
+    scheme = scheme_of(scene, domain.region_names)
+    points = seed_points(scene, domain, scheme.carried(domain.num_components))
     axes = tuple(domain.components.index(m.direction) for m in scene.motion)
     T = constraint_matrix(domain, scene.supports, axes)
     unknowns = int(T.getSize()[1])
     T.destroy()
-    lines = tuple(
-        len(excite(scene, scene.base_acceleration[:, s.samples], axes).lines)
-        for s in scene.segments
-    )
+    lines = _lines(scene, scheme, axes)
     loop = scene.effects.equivalent_linear
     iterations = 1 if loop is None else loop.max_iterations
     columns = list(scene.boundary.kinds.values()).count("free_field")
+    # What is carried over is one more side; beside a whole record it is swept on its own.
+    several = scheme.name != "steady" and len(lines) > 1
+    twice = several and scheme.name == "whole_record"
     if scene.solver.sweep == "reduced":
-        solved, held = [min(n, _EXPANSIONS) for n in lines], _BASIS
+        solved, held = [min(n, _EXPANSIONS) for n in lines], _BASIS * (1 + twice)
     else:
-        solved, held = list(lines), max(lines, default=0) * len(axes)
+        solved, held = list(lines), max(lines, default=0) * (len(axes) + several)
+    sweeps = sum(solved) + (sum(solved[1:]) if twice else 0)
     num_points = comm.allreduce(len(points))
+    memory = _memory(unknowns, domain.gdim, held, _num_parts(scene))
     return Inspection(
         effects=scene.effects.named,
         cells=domain.num_cells,
@@ -101,34 +112,121 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         points=num_points,
         lapses=len(lines),
         samples_per_lapse=scene.segments[0].num_samples,
+        continuity=_continuity(scene, scheme),
+        complex_modulus=_complex_modulus(scene),
         lines=lines,
-        factorisations=sum(solved) * iterations * (1 + columns),
-        shared_bytes=_memory(unknowns, domain.gdim, held) + num_points * points.bytes_per_point,
+        factorisations=sweeps * iterations * (1 + columns),
+        shared_bytes=memory + num_points * points.bytes_per_point,
         ranks=comm.size,
-        notes=_notes(scene, lines),
+        notes=tuple(_notes(scene, scheme, lines, domain.region_names)),
     )
 
 
-def _memory(unknowns: int, gdim: int, columns: int) -> int:
+def _lines(scene: Scene, scheme: Scheme, axes: tuple[int, ...]) -> tuple[int, ...]:
+    """Lines solved in each lapse."""
+    if scheme.contour is not None:
+        return (scheme.num_lines(scene.solver.max_frequency),) * len(scene.segments)
+    motion = scene.base_acceleration
+    return tuple(len(excite(scene, motion[:, s.samples], axes).lines) for s in scene.segments)
+
+
+def _num_parts(scene: Scene) -> int:
+    """Stiffness matrices of the law."""
+    return 1 + len(RELAXATION_TIMES) if scene.solver.complex_modulus == "maxwell" else 2
+
+
+def _memory(unknowns: int, gdim: int, columns: int, parts: int) -> int:
     log = max(unknowns, 2).bit_length()
     factor = _FACTOR_2D * unknowns * log if gdim == 2 else float(unknowns) ** (4 / 3)
     row = (9 if gdim == 2 else 27) * gdim * 2
-    matrices = 8 * unknowns * row * (_ENTRY + 8)
+    matrices = (6 + parts) * unknowns * row * (_ENTRY + 8)
     return int(2 * factor * _ENTRY + matrices + unknowns * columns * _ENTRY)
 
 
-def _notes(scene: Scene, lines: tuple[int, ...]) -> tuple[str, ...]:
-    notes = []
-    if not any(lines):
-        notes.append("no line is excited: the motion is zero up to solver.max_frequency")
-    if scene.solver.sweep == "reduced":
-        notes.append(
-            "the reduced sweep takes the factorisations it needs: their number is from experience"
+def _continuity(scene: Scene, scheme: Scheme) -> str:
+    """The continuity in words: where it comes from and what is solved."""
+    name, several = scene.lapses.continuity, len(scene.segments) > 1
+    if _names(scene, "lapses", "continuity"):
+        why = "named"
+    elif not several:
+        why = "the default for one lapse"
+    else:
+        why = "the default for " + (
+            "several lapses" if name == "transient" else "harmonic motions alone"
         )
-    if scene.effects.convection and len(lines) == 1:
-        notes.append("convection acts between lapses; the scene has one")
-    if scene.effects.convection:
-        notes.append("under steady continuity the net movement of the points in a lapse is zero")
-    if scene.effects.geometric_stiffness:
-        notes.append("the points start without stress: geometric_stiffness adds nothing yet")
-    return tuple(notes)
+    if scheme.contour is None:
+        return f"{name} ({why}): each lapse is a period of its own"
+    record, lapse = scene.base_acceleration.shape[1], scene.segments[0].num_samples
+    whole = scheme.name == "whole_record"
+    times = scheme.contour.period // (record if whole else lapse)
+    over = f"{times} times the " + ("whole record, for every lapse" if whole else "lapse")
+    period = scheme.contour.period * scene.dt
+    return f"{name} ({why}): all lines of a damped contour of {period:g} s, {over}"
+
+
+def _complex_modulus(scene: Scene) -> str:
+    """The complex modulus in words, and where it comes from."""
+    name = scene.solver.complex_modulus
+    if _names(scene, "solver", "complex_modulus"):
+        why = "named"
+    else:
+        why = "the default" + (" for several transient lapses" if name == "maxwell" else "")
+    if name != "maxwell":
+        return f"{name} ({why})"
+    given = _names(scene, "solver", "reference_frequency")
+    frequency = f"{scene.solver.reference_frequency:.3g} Hz"
+    return f"{name} ({why}), G at {frequency}, " + (
+        "as named" if given else "the dominant frequency of the motion"
+    )
+
+
+def _names(scene: Scene, section: str, key: str) -> bool:
+    return scene.data.get(section, {}).get(key) is not None
+
+
+def _notes(
+    scene: Scene, scheme: Scheme, lines: tuple[int, ...], soils: tuple[str, ...]
+) -> Iterator[str]:
+    effects, steady = scene.effects, scheme.name == "steady"
+    if not any(lines) or not np.any(scene.base_acceleration):
+        yield "no line is excited: the motion is zero up to solver.max_frequency"
+    if scene.solver.sweep == "reduced":
+        yield "the reduced sweep takes the factorisations it needs: their number is from experience"
+    if scheme.name == "whole_record":
+        yield (
+            f"{scene.solver.complex_modulus} damping cannot be stopped and started again: every "
+            "lapse solves the lines of the whole record, and a free vibration about it; maxwell "
+            "costs less and hands over exactly"
+        )
+    if scene.solver.complex_modulus == "maxwell":
+        yield from _damping_notes(scene, soils)
+    if effects.convection and len(lines) == 1:
+        yield "convection acts between lapses; the scene has one"
+    if effects.convection and steady:
+        yield "under steady continuity the net movement of the points in a lapse is zero"
+    if effects.degradation is not None:
+        yield "degradation acts between lapses: cycles of one lower the modulus from the next on"
+    if effects.geometric_stiffness:
+        yield "the points start without stress: geometric_stiffness adds nothing yet"
+
+
+def _damping_notes(scene: Scene, soils: tuple[str, ...]) -> Iterator[str]:
+    """Soils whose damping may be more than the Maxwell law can hold."""
+    loop = scene.effects.equivalent_linear is not None
+    but = f"above {HELD_DAMPING:g} four Maxwell branches no longer hold the loss factor"
+    for name in soils:
+        curve = scene.soil[name].curve if loop else None
+        if curve is None:
+            damping = scene.soil[name].damping_ratio(loop)
+            if damping > HELD_DAMPING:
+                yield f"soil {name}: damping is {damping:.2g}; {but}"
+        elif curve.damping.max() > HELD_DAMPING:
+            strain = np.geomspace(curve.strain[0], curve.strain[-1], 1000)
+            beyond = strain[np.argmax(curve.evaluate(strain)[1] > HELD_DAMPING)]
+            yield (
+                f"soil {name}: damping may reach {curve.damping.max():.2g}, from strains of "
+                f"{100 * beyond:.2g} % more than {HELD_DAMPING:g}; {but}"
+            )
+    calm = scene.effects.calm
+    if calm is not None and calm.damping > HELD_DAMPING:
+        yield f"effects.calm: damping reaches {calm.damping:.2g} at the side; {but}"

@@ -115,20 +115,3 @@ class Receivers:
             np.concatenate([cells, points.cell[carried]]), np.concatenate([X, points.X[carried]])
         )
         return sites, np.concatenate([numbers, riders])
-
-    def carried(self, points: Points) -> RealArray:
-        """How far each receiver has been carried by its point.
-
-        Args:
-            points: The points.
-
-        Returns:
-            [m], zero for fixed places and for points that have left the mesh, shape
-            ``(num_receivers, gdim)``, the same on every rank.
-        """
-        offset = np.zeros((len(self.names), self._domain.gdim))
-        if len(self._ids):
-            for rider, identity in zip(self._riders, self._ids, strict=True):
-                offset[rider] = points.displacement[points.id == identity].sum(axis=0)
-            offset = self._domain.comm.allreduce(offset)
-        return offset

@@ -16,6 +16,8 @@ from fenics_hytf.particles import Points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Snapshot
 
+_INTERNAL = ("X", "memory_strain")
+
 _MESHIO = {
     "triangle": "triangle",
     "quadrilateral": "quad",
@@ -36,7 +38,8 @@ def take_snapshot(
     """Gather points, and fields where the scene asks for them (collective).
 
     The displacement field is that of the instant at which a receiver moves farthest (the middle of
-    the lapse where there is none).
+    the lapse where there is none). The memory of Maxwell branches is the solver's own state and is
+    left out.
 
     Args:
         scene: The scene.
@@ -51,12 +54,11 @@ def take_snapshot(
     Returns:
         The snapshot, filled on rank 0 only.
     """
-    arrays = dict(points.arrays())
+    arrays = {name: values for name, values in points.arrays().items() if name not in _INTERNAL}
     arrays["position"] = arrays.pop("x")
     cells = domain.input_cells[points.cell]
     arrays["cell"] = cells
     arrays["shear_modulus"] = moduli.shear_modulus[cells]
-    del arrays["X"]
     gathered = domain.comm.gather(arrays)
     everyone = None
     if gathered is not None:
@@ -83,6 +85,7 @@ def take_snapshot(
             "effective_strain": state.effective_strain,
             "peak_stress": state.peak_stress,
             "peak_acceleration": state.peak_acceleration,
+            **({} if state.degradation is None else {"degradation": state.degradation}),
         },
     )
 

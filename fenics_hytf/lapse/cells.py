@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: MIT
+"""The response in the middle of every cell: largest strain, stress and motion over a lapse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.frequency import share
+from fenics_hytf.lapse.material import Material
+from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
+from fenics_hytf.lapse.response import Response, Spectra
+from fenics_hytf.operators import constrained_rows, displacement_rows, split_rows, strain_rows
+from fenics_hytf.particles import cell_centres, gradient_matrices, transfer_matrix
+
+RealArray = npt.NDArray[np.float64]
+
+_BLOCK = 256  # cells whose spectra are held at once
+_AT_ONCE = 64  # blocks whose rows are made at once
+_FEW = 64  # cells whose histories are held at once: they stay in the cache
+
+
+@dataclass(frozen=True)
+class CarriedCells:
+    """What the cells of this rank bring from the lapse before.
+
+    Attributes:
+        strain: Strain at the start [-], shape ``(num_owned_cells, num_strains)``.
+        displacement: Relative to the base [m], shape ``(num_owned_cells, num_components)``.
+        stress: Shares of the stress, each of which fades in its own way, as half of the normal
+            stresses and the shear stresses [Pa], shape
+            ``(num_owned_cells, num_strains, num_shares)``.
+        fading: How they do, shape ``(num_shares, num_samples)``.
+    """
+
+    strain: RealArray
+    displacement: RealArray
+    stress: RealArray
+    fading: RealArray
+
+
+@dataclass(frozen=True)
+class CellPeaks:
+    """Largest values over the lapse, all cells in the order of the input.
+
+    Attributes:
+        strain: Shear strain [-], shape ``(num_cells,)``.
+        stress: Shear stress [Pa], shape ``(num_cells,)``.
+        acceleration: Norm of the total acceleration [m/s^2], shape ``(num_cells,)``.
+        velocity: Norm of the velocity relative to the base [m/s], shape ``(num_cells,)``.
+        displacement: Norm of the displacement relative to the base [m], shape ``(num_cells,)``.
+    """
+
+    strain: RealArray
+    stress: RealArray
+    acceleration: RealArray
+    velocity: RealArray
+    displacement: RealArray
+
+
+class CellProbe:
+    """Evaluates the response at the centres of cells, a block of them at a time.
+
+    Args:
+        domain: The domain.
+        T: Constraint matrix.
+        convention: Strain measure, see :func:`peak_shear_strain`.
+
+    Groups of ranks with the same cells share out the blocks.
+    """
+
+    def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
+        self._domain, self._convention = domain, convention
+        blocks = domain.comm.allreduce(-(-domain.num_owned_cells // _BLOCK), MPI.MAX)
+        mine = range(blocks)[share(blocks, domain.across)]
+        self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
+        for first in range(mine.start, mine.stop, _AT_ONCE):
+            self._blocks += self._rows(T, range(first, min(first + _AT_ONCE, mine.stop)))
+
+    def _rows(self, T: PETSc.Mat, blocks: range) -> list[tuple[slice, PETSc.Mat, PETSc.Mat]]:
+        """Cells of some blocks, and the rows that evaluate their strain and displacement."""
+        domain, owned = self._domain, self._domain.num_owned_cells
+        bounds = [min(b * _BLOCK, owned) for b in range(blocks.start, blocks.stop + 1)]
+        centres = cell_centres(domain.mesh, bounds[0], bounds[-1])
+        count = domain.num_components
+        parts = []
+        for local in (
+            strain_rows(gradient_matrices(centres, domain.V), count),
+            displacement_rows(transfer_matrix(centres, domain.V), count),
+        ):
+            rows = constrained_rows(domain, local, T)
+            a_cell = local.shape[0] // max(len(centres), 1)
+            parts.append(split_rows(rows, [a_cell * (bound - bounds[0]) for bound in bounds]))
+            rows.destroy()
+        cells = [slice(first, stop) for first, stop in pairwise(bounds)]
+        return list(zip(cells, *parts, strict=True))
+
+    def destroy(self) -> None:
+        """Destroy the rows."""
+        for _, *rows in self._blocks:
+            for row in rows:
+                row.destroy()
+
+    def strains(
+        self, response: Response, carried: CarriedCells | None = None
+    ) -> Iterator[tuple[slice, RealArray]]:
+        """Strain histories, a few cells at a time (collective: every rank goes through them).
+
+        Args:
+            response: The response.
+            carried: What the lapse began with.
+
+        Yields:
+            The cells among this rank's, and their strain [-], shape
+            ``(num_cells, num_strains, num_samples)``.
+        """
+        weighed = response.weighed()
+        for cells, rows, _ in self._blocks:
+            for some, spectra in _by_few(cells, weighed(rows)):
+                yield some, self._strain(response, spectra, some, carried)
+
+    def _strain(
+        self, response: Response, spectra: Spectra, some: slice, carried: CarriedCells | None
+    ) -> RealArray:
+        history = response.history(spectra)
+        if carried is not None:
+            history += carried.strain[some, :, None].astype(history.dtype)
+        return history
+
+    def peak_strain(self, response: Response, carried: CarriedCells | None = None) -> RealArray:
+        """Largest shear strain of every cell (collective).
+
+        Args:
+            response: The response.
+            carried: What the lapse began with.
+
+        Returns:
+            All cells in the order of the input [-], shape ``(num_cells,)``.
+        """
+        peak = np.zeros((self._domain.num_owned_cells, 1))
+        for some, strain in self.strains(response, carried):
+            peak[some, 0] = peak_shear_strain(strain, self._convention)
+        return self._gather(peak)[:, 0]
+
+    def peaks(
+        self,
+        response: Response,
+        material: Material,
+        base: Spectra,
+        carried: CarriedCells | None = None,
+    ) -> CellPeaks:
+        """Largest strain, stress and motion of every cell (collective).
+
+        Args:
+            response: The response.
+            material: The law of every cell.
+            base: Motion of the base, which relative motion is relative to.
+            carried: What the lapse began with.
+
+        Returns:
+            The peaks.
+        """
+        given, owned = response.excitation, self._domain.num_owned_cells
+        peak = np.zeros((owned, 5))
+        stress = _StressHistories(response, material, self._domain.input_cells[:owned], carried)
+        motion = np.zeros((self._domain.num_components, given.num_samples))
+        motion[list(given.axes)] = given.base_acceleration
+        weighed = response.weighed()
+        for cells, strains, places in self._blocks:
+            for some, spectra in _by_few(cells, weighed(strains)):
+                strain = self._strain(response, spectra, some, carried)
+                for column, history in enumerate((strain, stress(spectra, some))):
+                    peak[some, column] = peak_shear_strain(history, self._convention)
+            for some, u in _by_few(cells, weighed(places)):
+                acceleration = response.history(u, 2)
+                acceleration += motion.astype(acceleration.dtype)
+                peak[some, 2] = peak_length(acceleration)
+                relative = u - base
+                peak[some, 3] = peak_length(response.history(relative, 1))
+                displacement = response.history(relative)
+                if carried is not None:
+                    displacement += carried.displacement[some, :, None].astype(displacement.dtype)
+                peak[some, 4] = peak_length(displacement)
+        return CellPeaks(*self._gather(peak).T)
+
+    def _gather(self, peak: RealArray) -> RealArray:
+        """All cells in the order of the input, from the ranks that looked at them."""
+        if self._domain.across.size > 1:
+            self._domain.across.Allreduce(MPI.IN_PLACE, peak, MPI.MAX)
+        return self._domain.gather_cells(peak)
+
+
+class _StressHistories:
+    """Shear stress of cells from their strain: G(s) times what comes, and what is there already."""
+
+    def __init__(
+        self,
+        response: Response,
+        material: Material,
+        cells: npt.NDArray[np.int64],
+        carried: CarriedCells | None,
+    ) -> None:
+        parts = material.parts
+        s = response.excitation.s
+        self._response, self._carried = response, carried
+        self._moduli = np.stack([p.constants.shear_modulus[cells] for p in parts], axis=1)
+        self._functions = np.stack([[p.function(complex(z)) for z in s] for p in parts])
+        self._start = None if response.start is None else response.start_through(parts)
+
+    def __call__(self, spectra: Spectra, some: slice) -> RealArray:
+        moduli = self._moduli[some]
+        values = spectra.coefficients
+        factor = (moduli @ self._functions).astype(values.dtype)
+        history = self._response.excitation.to_time(factor[:, None, :] * values)
+        if self._start is not None and spectra.start is not None:
+            functions = np.tensordot(moduli, self._start, axes=1).astype(history.dtype)
+            history += spectra.start.astype(history.dtype) @ functions
+        if self._carried is not None:
+            shares, fading = self._carried.stress[some], self._carried.fading
+            history += shares.astype(history.dtype) @ fading.astype(history.dtype)
+        return history
+
+
+def _by_few(cells: slice, spectra: Spectra) -> Iterator[tuple[slice, Spectra]]:
+    """Rows of a block, a few cells at a time, ``(num_cells, num_values)`` of them."""
+    count = cells.stop - cells.start
+    if count:
+        by_cell = spectra.reshape(count, len(spectra.coefficients) // count)
+        for first in range(0, count, _FEW):
+            stop = min(first + _FEW, count)
+            yield slice(cells.start + first, cells.start + stop), by_cell[first:stop]

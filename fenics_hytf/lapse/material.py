@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: MIT
+"""The material law of every cell at a complex frequency: a sum of real constants times functions.
+
+    D(s) = Σ_j f_j(s) D(λ_j, G_j)
+
+Hysteretic laws have two parts, G real and G imaginary times i·sign(ω) (see
+:mod:`fenics_hytf.soil.complex_modulus`). The causal Maxwell law has a relaxed part and one for
+each branch (:mod:`fenics_hytf.soil.maxwell`). With Poisson's ratio kept the whole elasticity tensor
+takes G(s)/G, with the bulk modulus kept its deviator does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.frequency import ScalarFunction, constant, hysteretic
+from fenics_hytf.lapse.ground import Ground, Moduli
+from fenics_hytf.scene import Solver
+from fenics_hytf.soil import (
+    RELAXATION_TIMES,
+    branch_weights,
+    branches,
+    complex_factor,
+    relaxed_factor,
+)
+
+RealArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ElasticConstants:
+    """Lamé's λ and the shear modulus of every cell [Pa], shape ``(num_cells,)``."""
+
+    lame_lambda: RealArray
+    shear_modulus: RealArray
+
+    def at(self, cells: npt.NDArray[np.integer]) -> tuple[RealArray, RealArray]:
+        """λ and G of some cells."""
+        return self.lame_lambda[cells], self.shear_modulus[cells]
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a law.
+
+    Attributes:
+        name: What its matrix is kept under.
+        constants: Of every cell.
+        function: f(s).
+        relaxation_time: τ of a Maxwell branch [s], ``None`` for other parts.
+    """
+
+    name: str
+    constants: ElasticConstants
+    function: ScalarFunction
+    relaxation_time: float | None = None
+
+    @property
+    def instantaneous(self) -> float:
+        """Share of the part in the stiffness against a jump, f(s → ∞) on the real axis."""
+        return float(np.real(self.function(complex(1e12))))
+
+
+@dataclass(frozen=True)
+class Material:
+    """The law of all cells, in the order of the input.
+
+    Attributes:
+        real: Elastic constants at the frequency at which the modulus is G.
+        parts: The parts; the first one is never without stiffness.
+    """
+
+    real: ElasticConstants
+    parts: tuple[Part, ...]
+
+    @property
+    def branches(self) -> tuple[Part, ...]:
+        """The parts that remember."""
+        return tuple(part for part in self.parts if part.relaxation_time is not None)
+
+    def shear_factor(self, s: ComplexArray, cells: npt.NDArray[np.integer]) -> ComplexArray:
+        """G(s) of some cells [Pa].
+
+        Args:
+            s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+            cells: Their input numbers.
+
+        Returns:
+            Shape ``(len(cells), num_lines)``.
+        """
+        moduli = np.stack([part.constants.shear_modulus[cells] for part in self.parts], axis=1)
+        functions = np.stack([[part.function(complex(z)) for z in s] for part in self.parts])
+        return np.asarray(moduli @ functions, np.complex128)
+
+
+def material(ground: Ground, moduli: Moduli, solver: Solver) -> Material:
+    """The law that a scene's convention makes of secant moduli and damping.
+
+    Args:
+        ground: The ground, for Poisson's ratio, the small-strain bulk modulus and what an absorbing
+            layer adds.
+        moduli: Secant modulus and damping of every cell.
+        solver: Convention of the complex modulus, what is kept, reference frequency.
+
+    Returns:
+        The law; without any damping one part.
+    """
+    if solver.complex_modulus == "maxwell":
+        return _maxwell(ground, moduli, solver)
+    G = moduli.shear_modulus * complex_factor(moduli.damping, solver.complex_modulus)
+    lame = _lame(ground, G, solver.keep)
+    real = ElasticConstants(lame.real, G.real)
+    if ground.absorbing is not None:
+        absorbed = 1 + 2j * ground.absorbing
+        lame, G = lame.real * absorbed + 1j * lame.imag, G.real * absorbed + 1j * G.imag
+    parts = [Part("real", real, constant)]
+    if np.any(G.imag):
+        parts.append(Part("imaginary", ElasticConstants(lame.imag, G.imag), hysteretic))
+    return Material(real, tuple(parts))
+
+
+def _lame(ground: Ground, G: npt.NDArray[Any], keep: str) -> npt.NDArray[Any]:
+    """λ that belongs to a shear modulus, real or complex."""
+    nu = ground.poisson
+    if keep == "poisson":
+        return G * (2 * nu / (1 - 2 * nu))
+    bulk = ground.shear_modulus * 2 * (1 + nu) / (3 * (1 - 2 * nu))
+    return bulk - 2 / 3 * G
+
+
+def _maxwell(ground: Ground, moduli: Moduli, solver: Solver) -> Material:
+    G = moduli.shear_modulus
+    real = ElasticConstants(_lame(ground, G, solver.keep), G)
+    damping = moduli.damping if ground.absorbing is None else moduli.damping + ground.absorbing
+    damping = np.minimum(damping, _MOST_DAMPING)
+    assert solver.reference_frequency is not None
+    relaxed = G * relaxed_factor(damping, solver.reference_frequency)
+    parts = [Part("real", ElasticConstants(_lame(ground, relaxed, solver.keep), relaxed), constant)]
+    for number, (weight, tau) in enumerate(
+        zip(branch_weights(damping).T, RELAXATION_TIMES, strict=True)
+    ):
+        if np.any(weight):
+            share = relaxed * weight
+            # Of the deviator alone where the bulk modulus is kept: λ = −2/3 G.
+            lame = _lame(ground, share, "poisson") if solver.keep == "poisson" else -2 / 3 * share
+            constants = ElasticConstants(lame, share)
+            parts.append(Part(f"branch {number}", constants, branches[number], tau))
+    return Material(real, tuple(parts))
+
+
+_MOST_DAMPING = 0.95  # at the rim of an absorbing layer

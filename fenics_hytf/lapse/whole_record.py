@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT
+"""Transient continuity where a law that is not causal is insisted on: u = U_j + w.
+
+Hysteretic damping feels the future as well as the past, so no state at one instant can start it
+again. In each lapse the whole record is solved with the lapse's matrices, U_j, and what u and v at
+the seam differ from it by goes on as a free vibration w in total form:
+
+    A(s) U_j = −M r â_g (of the whole record, from rest)
+    A(s) W = s M w₀ + M ẇ₀ + C w₀,    w₀ = u − U_j,  ẇ₀ = v − V_j  at the seam
+
+While the matrices do not change w is nought and the lapses are one. Every lapse costs all lines of
+the record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.frequency import AffineLoads, Columns, JoinedSweep
+from fenics_hytf.lapse.continuity import Solve
+from fenics_hytf.lapse.equations import Equations, LapseEquations
+from fenics_hytf.lapse.excitation import Excitation
+from fenics_hytf.lapse.material import Material
+from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.starts import largest, product, start_columns
+from fenics_hytf.motion import (
+    Contour,
+    LapseRecord,
+    Segment,
+    StartFunctions,
+    band_limited,
+    frequencies,
+)
+from fenics_hytf.particles import Points, transfer_matrix
+from fenics_hytf.scene import Scene
+
+RealArray = npt.NDArray[np.float64]
+
+_TIMES, _DECAY = 4, 9.2  # T_p over the record, and ηT_p
+
+
+class WholeRecord:
+    """The response to the whole record and a free vibration about it.
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+        equations: Its equations.
+    """
+
+    goes_on_from_nought = False
+
+    def __init__(self, scene: Scene, domain: Domain, equations: Equations) -> None:
+        self._scene, self._domain, self._equations = scene, domain, equations
+        motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
+        record = LapseRecord(motion, scene.dt)
+        self._motion = motion
+        self._contour = Contour.over(motion.shape[1], scene.dt, _TIMES, _DECAY)
+        self._transform = self._contour.transform(motion, record.derivatives[:, :, 0].T)
+        # A free vibration is as long as a lapse.
+        length = scene.segments[0].num_samples
+        lapse = Contour.over(length, scene.dt, _TIMES, _DECAY)
+        self._start = StartFunctions.fading_in(lapse, scene.solver.max_frequency)
+        self._excitation: Excitation
+        self._points: Points
+
+    @property
+    def fields(self) -> Mapping[str, tuple[int, ...]]:
+        """Displacement and velocity."""
+        shape = (self._domain.num_components,)
+        return {"dynamic_velocity": shape, "dynamic_displacement": shape}
+
+    def excite(self, segment: Segment) -> Excitation:
+        """All lines of the record, read from the start of the lapse on."""
+        limit, contour = self._scene.solver.max_frequency, self._contour
+        frequency = frequencies(contour.period, contour.dt)
+        lines = np.flatnonzero(frequency <= (limit or np.inf) * (1 + 1e-12))
+        later = np.exp(contour.s[lines] * segment.start * contour.dt)
+        weights = self._transform[:, lines] * later
+        if segment.index:
+            weights = np.concatenate([weights, np.full((1, len(lines)), 1 / contour.dt)])
+        return Excitation(
+            lines,
+            weights,
+            self._equations.axes,
+            contour.period,
+            contour.dt,
+            len(lines),
+            segment.num_samples,
+            contour.eta,
+            self._motion[:, segment.samples],
+            self._start,
+        )
+
+    def begin(self, points: Points, excitation: Excitation) -> None:
+        """Remember where the points are."""
+        self._points, self._excitation = points, excitation
+
+    def respond(self, solve: Solve, equations: LapseEquations, material: Material) -> Response:
+        """The response to the record and, after the first lapse, the free vibration about it."""
+        given = self._excitation
+        record = solve(equations.loads)
+        driven = Response(record, replace(given, weights=given.motion_weights, start=None))
+        if len(given.weights) == len(given.axes):
+            return driven
+        w, rate = (self._momentum_beside(driven, derivative) for derivative in (0, 1))
+        displacement, velocity = self._equations.accelerate(w), self._equations.accelerate(rate)
+        damped = product([(C, 1.0) for C in equations.viscous], displacement, like=w)
+        s = given.s
+        coefficients = np.stack([s, np.ones_like(s), np.ones_like(s)])[:, None]
+        free = solve(AffineLoads([w, rate, damped], coefficients))
+        start = self._starts(equations, displacement, velocity, like=w)
+        for vector in (w, rate, damped):
+            vector.destroy()
+        return Response(JoinedSweep(record, free), given, start)
+
+    def _momentum_beside(self, driven: Response, derivative: int) -> PETSc.Vec:
+        """SᵀM_p times what the points' displacement or velocity differs from the driven one by."""
+        points, S = self._points, transfer_matrix(self._points, self._domain.V)
+        carried = points["dynamic_velocity" if derivative else "dynamic_displacement"]
+        nodal = self._equations.expand(driven.unknowns_at(0.0, derivative))
+        return self._equations.collect(
+            (S.T @ (points.mass[:, None] * (carried - S @ nodal))).ravel()
+        )
+
+    def _starts(
+        self, equations: LapseEquations, w: RealArray, rate: RealArray, like: PETSc.Vec
+    ) -> Columns:
+        """C of the start functions of the free vibration."""
+        viscous = [(C, 1.0) for C in equations.viscous]
+
+        def force(velocity: RealArray, displacement: RealArray) -> RealArray:
+            pull = product(viscous, velocity, like)
+            spring = product(equations.stiff, displacement, like)
+            pull.axpy(1.0, spring)
+            pull.scale(-1.0)
+            acceleration = self._equations.accelerate(pull)
+            pull.destroy()
+            spring.destroy()
+            return acceleration
+
+        acceleration = force(rate, w)
+        return start_columns(self._start, [w, rate, acceleration, force(acceleration, rate)])
+
+    def carried(self, material: Material) -> None:
+        """Nothing: the response is total."""
+        return None
+
+    def jump(self, points: Points, response: Response) -> tuple[float, float] | None:
+        """Displacement and velocity at the start of the lapse, against what was carried."""
+        if len(self._excitation.weights) == len(self._excitation.axes):
+            return None
+        S, comm = transfer_matrix(points, self._domain.V), self._domain.comm
+        u, v = (S @ self._equations.expand(response.unknowns_at(0.0, order)) for order in (0, 1))
+        return (
+            largest(comm, u - points["dynamic_displacement"]),
+            largest(comm, v - points["dynamic_velocity"]),
+        )
+
+    def energy(self, response: Response, material: Material, stored_before: float | None) -> None:
+        """A law that feels the future has no energy at an instant."""
+        return None
+
+    def finish(self, points: Points, response: Response, material: Material) -> None:
+        """Displacement and velocity at the end of the lapse."""
+        S, end = transfer_matrix(points, self._domain.V), response.excitation.duration
+        for name, derivative in (("dynamic_displacement", 0), ("dynamic_velocity", 1)):
+            points[name] = S @ self._equations.expand(response.unknowns_at(end, derivative))

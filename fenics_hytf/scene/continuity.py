@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""What lapses hand over to each other: defaults that hang on their number, and what may go wrong.
+
+The response is handed over exactly only under a causal law, so several transient lapses take the
+Maxwell law unless the scene names another. A lapse is solved on a damped contour; lines that are
+left out above a maximum frequency are felt there as an error that grows from lapse to lapse, unless
+the maximum is well above what the motion holds and lapses are long enough for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.motion import Segment, dominant_frequency, energy_band
+from fenics_hytf.scene.faults import Fault, toml_text
+from fenics_hytf.scene.motion import MotionInput
+from fenics_hytf.scene.settings import Lapses, Solver
+from fenics_hytf.scene.table import as_list
+
+_ABOVE_BAND = 2.0  # f_max over the frequency below which 99 % of the energy lies
+_PERIODS = 10.0  # f_max times the length of a lapse
+
+
+def resolve(
+    raw: dict[str, Any],
+    lapses: Lapses,
+    solver: Solver,
+    motions: tuple[MotionInput, ...],
+    segments: list[Segment],
+) -> tuple[Lapses, Solver]:
+    """Fill in what hangs on the number of lapses and on the motion.
+
+    Args:
+        raw: The raw table of the scene.
+        lapses: ``[lapses]``.
+        solver: ``[solver]``.
+        motions: The motions.
+        segments: The lapses.
+
+    Returns:
+        Both sections, with a continuity, a complex modulus and, for ``maxwell``, a reference
+        frequency.
+    """
+    continuity, law = lapses.continuity, solver.complex_modulus
+    if not _names(raw, "lapses", "continuity"):
+        tables = as_list(raw.get("motion"))
+        harmonic = all(isinstance(t, dict) and "harmonic" in t for t in tables)
+        continuity = "steady" if len(segments) == 1 or harmonic else "transient"
+    if not _names(raw, "solver", "complex_modulus"):
+        several = continuity == "transient" and len(segments) > 1
+        law = "maxwell" if several else "hysteretic"
+    frequency = solver.reference_frequency
+    if frequency is None and law == "maxwell":
+        frequency = dominant_frequency(_padded(motions), motions[0].record.dt)
+    return (
+        lapses.model_copy(update={"continuity": continuity}),
+        solver.model_copy(update={"complex_modulus": law, "reference_frequency": frequency}),
+    )
+
+
+def continuity_rules(
+    raw: dict[str, Any],
+    lapses: Lapses,
+    solver: Solver,
+    motions: tuple[MotionInput, ...],
+    segments: list[Segment],
+) -> Iterator[Fault]:
+    """A reference frequency where it is used; a maximum frequency that lapses can bear.
+
+    Args:
+        raw: The raw table of the scene.
+        lapses: ``[lapses]``, resolved.
+        solver: ``[solver]``, resolved.
+        motions: The motions.
+        segments: The lapses.
+
+    Yields:
+        The faults.
+    """
+    if solver.reference_frequency is not None and solver.complex_modulus != "maxwell":
+        expected = 'nothing without complex_modulus = "maxwell"'
+        yield Fault("solver.reference_frequency", toml_text(solver.reference_frequency), expected)
+    dt, cut = motions[0].record.dt, solver.max_frequency
+    several = len(segments) > 1 and lapses.continuity == "transient"
+    if not several or cut is None or cut >= 0.5 / dt * (1 - 1e-9):
+        return
+    found = toml_text(cut)
+    band = _ABOVE_BAND * energy_band(_padded(motions), dt)
+    if cut < band:
+        expected = (
+            f"at least {band:.3g} Hz, twice the frequency below which the motion has 99 % of its "
+            "energy, or none: with less, transient lapses drift apart"
+        )
+        yield Fault("solver.max_frequency", found, expected)
+    duration = segments[0].num_samples * dt
+    if cut * duration < _PERIODS:
+        expected = (
+            f"at least {_PERIODS / duration:.3g} Hz with lapses of {duration:g} s (frequency times "
+            f"length from {_PERIODS:g}), or none, or longer lapses: shorter ones blow up"
+        )
+        yield Fault("solver.max_frequency", found, expected)
+
+
+def _names(raw: dict[str, Any], section: str, key: str) -> bool:
+    table = raw.get(section)
+    return isinstance(table, dict) and key in table
+
+
+def _padded(motions: tuple[MotionInput, ...]) -> npt.NDArray[np.float64]:
+    count = max(motion.record.num_samples for motion in motions)
+    return np.stack([motion.record.padded(count).acceleration for motion in motions])

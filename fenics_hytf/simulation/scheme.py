@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: MIT
+"""Which way the lapses of a scene hang together, told from the scene alone.
+
+What :func:`fenics_hytf.lapse.choose_continuity` comes to, without a mesh: for estimates of cost and
+for words about a result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fenics_hytf.motion import Contour, frequencies
+from fenics_hytf.scene import Scene
+from fenics_hytf.soil import RELAXATION_TIMES
+
+_HANDOVER = (6, 13.8)  # T_p over the lapse, and ηT_p
+_WHOLE_RECORD = (4, 9.2)  # T_p over the record, and ηT_p
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How lapses hang together.
+
+    Attributes:
+        name: ``steady``: each is a periodic state of its own; ``handover``: displacement, velocity,
+            stress and memory go on; ``whole_record``: the response to the whole record in each, and
+            a free vibration about it.
+        contour: The damped contour that lines lie on, ``None`` under ``steady``.
+        remembers: Whether points carry the memory of Maxwell branches.
+    """
+
+    name: Literal["steady", "handover", "whole_record"]
+    contour: Contour | None = None
+    remembers: bool = False
+
+    def num_lines(self, max_frequency: float | None) -> int:
+        """Lines of a lapse on the contour up to a frequency [Hz]; up to Nyquist's if ``None``."""
+        if self.contour is None:
+            raise ValueError("found steady continuity; expected one on a damped contour")
+        frequency = frequencies(self.contour.period, self.contour.dt)
+        return int(np.count_nonzero(frequency <= (max_frequency or np.inf) * (1 + 1e-12)))
+
+    def carried(self, components: int) -> dict[str, tuple[int, ...]]:
+        """What points carry: shapes of one point's entry by name.
+
+        Args:
+            components: Components of the displacement.
+        """
+        vector, strains = (components,), {1: 2, 2: 3, 3: 6}[components]
+        if self.name == "steady":
+            return {}
+        fields: dict[str, tuple[int, ...]] = {
+            "dynamic_velocity": vector,
+            "dynamic_displacement": vector,
+        }
+        if self.name == "handover":
+            fields |= {"dynamic_strain": (strains,), "dynamic_stress": (strains,)}
+        if self.remembers:
+            fields["memory_strain"] = (len(RELAXATION_TIMES), strains)
+        return fields
+
+
+def scheme_of(scene: Scene, region_names: Collection[str]) -> Scheme:
+    """The scheme of a scene.
+
+    Args:
+        scene: The scene.
+        region_names: Soils of the mesh.
+
+    Returns:
+        The scheme.
+    """
+    if scene.lapses.continuity == "steady":
+        return Scheme("steady")
+    maxwell, damped = scene.solver.complex_modulus == "maxwell", _is_damped(scene, region_names)
+    length, dt = scene.segments[0].num_samples, scene.dt
+    if maxwell or not damped or len(scene.segments) == 1:
+        return Scheme("handover", Contour.over(length, dt, *_HANDOVER), maxwell and damped)
+    total = scene.base_acceleration.shape[1]
+    return Scheme("whole_record", Contour.over(total, dt, *_WHOLE_RECORD))
+
+
+def _is_damped(scene: Scene, region_names: Collection[str]) -> bool:
+    """Whether a soil or an absorbing layer has damping."""
+    loop = scene.effects.equivalent_linear is not None
+    soils = [scene.soil[name] for name in region_names]
+    damped = any((loop and soil.curve is not None) or soil.damping_ratio(loop) for soil in soils)
+    return damped or scene.effects.calm is not None
