@@ -33,7 +33,7 @@ RealArray = npt.NDArray[np.float64]
 Lines = npt.NDArray[np.intp]
 
 _MARGIN = 0.8  # sketched residuals, right to 4 %, stay below this fraction of the tolerance
-_STRIDE = 4  # lines of the first check: every fourth
+_STRIDE = 4  # lines of the first check: every fourth, or so many widths of a damped contour
 _DROP = 1e-8  # directions that a block has in common with the basis but for this are dropped
 _DROP_OF_SOLUTION = 1e-14  # round-off alone: its share of stiff directions may be small
 _WORST = 5  # lines whose true residual is taken at the end
@@ -174,7 +174,7 @@ class _Growth:
         self.expansions: list[int] = []
         self._solves = 0
         self._coarse = True
-        self._checked = np.arange(0, len(lines), _STRIDE)
+        self._checked = np.arange(0, len(lines), _stride(lines))
         self.pending = self._checked
 
     @property
@@ -351,3 +351,14 @@ def _intervals(excess: RealArray, count: int) -> list[Lines]:
             break
         chosen[longest : longest + 1] = np.array_split(chosen[longest], 2)
     return chosen
+
+
+def _stride(lines: ComplexArray) -> int:
+    """Lines from one to the next of the first check.
+
+    No resonance is narrower than η, so on a contour whose lines lie closer more may be left out.
+    """
+    if len(lines) < 2:
+        return _STRIDE
+    apart = float(np.median(np.abs(np.diff(lines.imag))))
+    return _STRIDE * max(1, round(float(lines.real.min()) / apart)) if apart > 0 else _STRIDE

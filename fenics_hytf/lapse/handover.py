@@ -37,7 +37,7 @@ from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response
-from fenics_hytf.lapse.starts import largest, product, start_columns
+from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.motion import (
     Contour,
     LapseRecord,
@@ -160,7 +160,7 @@ class Handover:
         start = self._starts(equations, material, forces)
         for force in forces:
             force.destroy()
-        return Response(sweep, self._excitation, start)
+        return Response(sweep, self._excitation, start, start_factorisations=1)
 
     def _forces(self, material: Material) -> list[PETSc.Vec]:
         """Forces of what is carried: f of each part of the law, and f_q."""
@@ -190,25 +190,31 @@ class Handover:
         self, equations: LapseEquations, material: Material, forces: list[PETSc.Vec]
     ) -> Columns:
         """C of the start functions, from velocity, acceleration and its rate at the start."""
-        assert self._momentum is not None
         motion = self._record.derivatives[:, :, self._segment.start]
         viscous = [(C, 1.0) for C in equations.viscous]
-        v = self._equations.accelerate(self._momentum)
-        a = self._accelerate(0, motion[0], forces, [1.0] * len(forces), [(viscous, v)])
         taus = [*(part.relaxation_time for part in material.parts), FADING]
         rates = [-1 / tau if tau else 0.0 for tau in taus]
-        j = self._accelerate(1, motion[1], forces, rates, [(viscous, a), (equations.stiff, v)])
+        with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
+            assert self._momentum is not None
+            v = accelerate(self._momentum)
+            force = self._start_force(0, motion[0], forces, [1.0] * len(forces), [(viscous, v)])
+            a = accelerate(force)
+            force.destroy()
+            products = [(viscous, a), (equations.stiff, v)]
+            force = self._start_force(1, motion[1], forces, rates, products)
+            j = accelerate(force)
+            force.destroy()
         return start_columns(self._start, [0 * v, v, a, j])
 
-    def _accelerate(
+    def _start_force(
         self,
         derivative: int,
         motion: RealArray,
         forces: list[PETSc.Vec],
         factors: list[float],
         products: list[tuple[list[tuple[PETSc.Mat, float]], RealArray]],
-    ) -> RealArray:
-        """M⁻¹ of what acts at the start, or its rate, less the carried forces and products."""
+    ) -> PETSc.Vec:
+        """What acts at the start, or its rate, less the carried forces and products of matrices."""
         total = forces[0].duplicate()
         total.zeroEntries()
         self._equations.add_side_start(derivative, total)
@@ -220,9 +226,7 @@ class Handover:
             taken = product(matrices, x, like=total)
             total.axpy(-1.0, taken)
             taken.destroy()
-        found = self._equations.accelerate(total)
-        total.destroy()
-        return found
+        return total
 
     def carried(self, material: Material) -> CarriedCells | None:
         """Strain and stress in the middle of cells, and how the stress fades."""

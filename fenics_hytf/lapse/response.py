@@ -68,11 +68,13 @@ class Response:
         sweep: Transfer functions h of each motion (5), and those of what is carried over.
         excitation: What they are weighed with.
         start: c of the start functions on this rank's unknowns, or ``None`` without a start.
+        start_factorisations: Matrices factorised for them.
     """
 
     sweep: Sweep
     excitation: Excitation
     start: Columns | None = None
+    start_factorisations: int = 0
 
     def transfer(self, rows: PETSc.Mat) -> ComplexArray:
         """Transfer functions h of the motions, shape ``(n, num_motions, num_lines)``."""

@@ -28,7 +28,7 @@ from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
-from fenics_hytf.lapse.starts import largest, product, start_columns
+from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.motion import (
     Contour,
     LapseRecord,
@@ -110,15 +110,15 @@ class WholeRecord:
         if len(given.weights) == len(given.axes):
             return driven
         w, rate = (self._momentum_beside(driven, derivative) for derivative in (0, 1))
-        displacement, velocity = self._equations.accelerate(w), self._equations.accelerate(rate)
+        displacement = self._equations.accelerate(w)
         damped = product([(C, 1.0) for C in equations.viscous], displacement, like=w)
         s = given.s
         coefficients = np.stack([s, np.ones_like(s), np.ones_like(s)])[:, None]
         free = solve(AffineLoads([w, rate, damped], coefficients))
-        start = self._starts(equations, displacement, velocity, like=w)
+        start = self._starts(equations, w, rate)
         for vector in (w, rate, damped):
             vector.destroy()
-        return Response(JoinedSweep(record, free), given, start)
+        return Response(JoinedSweep(record, free), given, start, start_factorisations=1)
 
     def _momentum_beside(self, driven: Response, derivative: int) -> PETSc.Vec:
         """SᵀM_p times what the points' displacement or velocity differs from the driven one by."""
@@ -129,24 +129,20 @@ class WholeRecord:
             (S.T @ (points.mass[:, None] * (carried - S @ nodal))).ravel()
         )
 
-    def _starts(
-        self, equations: LapseEquations, w: RealArray, rate: RealArray, like: PETSc.Vec
-    ) -> Columns:
-        """C of the start functions of the free vibration."""
+    def _starts(self, equations: LapseEquations, w: PETSc.Vec, rate: PETSc.Vec) -> Columns:
+        """c of the start functions of the free vibration, from its two momenta."""
         viscous = [(C, 1.0) for C in equations.viscous]
-
-        def force(velocity: RealArray, displacement: RealArray) -> RealArray:
-            pull = product(viscous, velocity, like)
-            spring = product(equations.stiff, displacement, like)
-            pull.axpy(1.0, spring)
-            pull.scale(-1.0)
-            acceleration = self._equations.accelerate(pull)
-            pull.destroy()
-            spring.destroy()
-            return acceleration
-
-        acceleration = force(rate, w)
-        return start_columns(self._start, [w, rate, acceleration, force(acceleration, rate)])
+        with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
+            found = [accelerate(w), accelerate(rate)]
+            for _ in range(2):
+                pull = product(viscous, found[-1], like=w)
+                spring = product(equations.stiff, found[-2], like=w)
+                pull.axpy(1.0, spring)
+                pull.scale(-1.0)
+                found.append(accelerate(pull))
+                pull.destroy()
+                spring.destroy()
+        return start_columns(self._start, found)
 
     def carried(self, material: Material) -> None:
         """Nothing: the response is total."""
