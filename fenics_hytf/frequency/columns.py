@@ -30,9 +30,7 @@ class Columns:
     @property
     def blocks(self) -> list[ComplexArray]:
         """The columns there are, side by side, each shape ``(num_rows, 64 or fewer)``."""
-        widths = np.clip(
-            self.size - self._width * np.arange(len(self._storage)), 0, self._width
-        )
+        widths = np.clip(self.size - self._width * np.arange(len(self._storage)), 0, self._width)
         return [block[:, :width] for block, width in zip(self._storage, widths, strict=True)]
 
     def append(self, columns: ComplexArray) -> None:

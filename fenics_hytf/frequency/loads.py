@@ -54,9 +54,7 @@ class AffineLoads:
         for side in range(len(self)):
             total = self.vectors[0].duplicate()
             total.zeroEntries()
-            for vector, factor in zip(
-                self.vectors, self.coefficients[:, side, line], strict=True
-            ):
+            for vector, factor in zip(self.vectors, self.coefficients[:, side, line], strict=True):
                 if factor:
                     total.axpy(factor, vector)
             sides.append(total)

@@ -194,16 +194,18 @@ class Handover:
         viscous = [(C, 1.0) for C in equations.viscous]
         taus = [*(part.relaxation_time for part in material.parts), FADING]
         rates = [-1 / tau if tau else 0.0 for tau in taus]
+        assert self._momentum is not None
+        v = self._equations.accelerate(self._momentum)
+        ones, stiff = [1.0] * len(forces), equations.stiff
+        force = self._start_force(0, motion[0], forces, ones, [(viscous, v)])
+        rate = self._start_force(1, motion[1], forces, rates, [(stiff, v)])
         with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
-            assert self._momentum is not None
-            v = accelerate(self._momentum)
-            force = self._start_force(0, motion[0], forces, [1.0] * len(forces), [(viscous, v)])
-            a = accelerate(force)
-            force.destroy()
-            products = [(viscous, a), (equations.stiff, v)]
-            force = self._start_force(1, motion[1], forces, rates, products)
-            j = accelerate(force)
-            force.destroy()
+            a = accelerate(force, rate)
+            slowed = product(viscous, a, like=rate)
+            rate.axpy(-1.0, slowed)
+            j = accelerate(rate)
+        for vector in (force, rate, slowed):
+            vector.destroy()
         return start_columns(self._start, [0 * v, v, a, j])
 
     def _start_force(
@@ -259,8 +261,10 @@ class Handover:
     def energy(
         self, response: Response, material: Material, stored_before: float | None
     ) -> Energy | None:
-        """What came in, was lost and is stored; not beside a free field, which works as well."""
-        if "free_field" in self._scene.supports.values():
+        """What came in, was lost and is stored; not beside a free field, which does work as well."""
+        law, sides = self._scene.solver.complex_modulus, self._scene.supports.values()
+        causal = law == "maxwell" or len(material.parts) == 1
+        if not causal or "free_field" in sides:
             return None
         course, segment = Course(response, self._domain.comm), self._segment
         v, fade = course.coordinates(1), course.time / FADING

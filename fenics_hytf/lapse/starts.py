@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""The start of a lapse on the unknowns: velocity and its rates, as far as lines can follow them.
+"""The start of a lapse on the unknowns: acceleration and its rate, as far as lines can follow.
 
-A fine mesh has modes far above the highest line. What a start holds of them grows with every rate,
-is taken out of the transform and is not put back by lines that are not there: handed on from seam
-to seam it grew without bounds. So the start is held by M⁻¹f of the forces in modes that lines can
-follow, and the rest is left to the lines:
+A fine mesh has modes, and dashpots rates, far above the highest line. What is not in balance there,
+if only round-off, makes accelerations that grow with the square of their frequency; start functions
+that hold them are not undone by lines that are not there, and handed on from seam to seam the error
+grew without bounds. So accelerations are those of modes that lines can follow,
 
-    F M⁻¹f,    F = (I + (M⁻¹A)²)⁻¹,    A = K/σ² + C/σ
+    a = F M⁻¹f + (I − F) C⁻¹ḟ,    F = (I + (M⁻¹A)²)⁻¹,    A = K/σ² + C/σ
 
-with σ above the highest circular frequency. F is 1/(1 + (ω/σ)⁴) of an undamped mode. For real f it
-is the imaginary part of (A − iM)⁻¹f, one more factorisation of the same pattern.
+with f the force out of balance, ḟ its rate but for C a, and σ above the highest circular frequency:
+F is 1/(1 + (ω/σ)⁴) of an undamped mode. Where viscous forces are stiff the velocity follows the
+forces at once, so the acceleration follows their rate; with (I − F) C⁻¹ ≈ (I − F)(M⁻¹A)⁻¹M⁻¹/σ both
+come from one complex solve,
+
+    a = Im[(A − iM)⁻¹(f + iḟ/σ)]
+
+a factorisation of the pattern of all others. Velocities are taken as they are: what they hold of
+high modes fades from seam to seam.
 """
 
 from __future__ import annotations
@@ -36,7 +43,7 @@ _ABOVE = 2.0  # σ over the highest circular frequency; 1.4 to 2 kept every case
 
 
 class StartSolver:
-    """M⁻¹f in the modes that lines can follow; a context manager that owns a factorisation.
+    """Accelerations that lines can follow; a context manager that owns a factorisation.
 
     Args:
         equations: The equations.
@@ -47,9 +54,7 @@ class StartSolver:
         self._sigma = _ABOVE * highest
         terms = [(matrix, _times(share)) for matrix, share in equations.stiff]
         terms += [(matrix, _times(self._sigma)) for matrix in equations.viscous]
-        self._factorisation = SymmetricFactorisation(
-            DynamicSystem(terms, equations.system.mass)
-        )
+        self._factorisation = SymmetricFactorisation(DynamicSystem(terms, equations.system.mass))
         # s² M = −iσ² M there, and the matrix is σ²(A − iM)
         self._factorisation.factorise(self._sigma * np.exp(-0.25j * np.pi))
 
@@ -59,12 +64,23 @@ class StartSolver:
     def __exit__(self, *error: object) -> None:
         self._factorisation.__exit__(*error)
 
-    def __call__(self, force: PETSc.Vec) -> RealArray:
-        """F M⁻¹f on this rank's unknowns (collective), shape ``(num_local_unknowns,)``."""
-        x = force.duplicate()
-        self._factorisation.backsolve(force, x)
+    def __call__(self, force: PETSc.Vec, rate: PETSc.Vec | None = None) -> RealArray:
+        """The acceleration under a force out of balance (collective).
+
+        Args:
+            force: f.
+            rate: ḟ but for the viscous forces that the acceleration brings; nought if ``None``.
+
+        Returns:
+            On this rank's unknowns, shape ``(num_local_unknowns,)``.
+        """
+        x, right = force.duplicate(), force.copy()
+        if rate is not None:
+            right.axpy(1j / self._sigma, rate)
+        self._factorisation.backsolve(right, x)
         values = self._sigma**2 * x.array_r.imag
         x.destroy()
+        right.destroy()
         return np.asarray(values)
 
 

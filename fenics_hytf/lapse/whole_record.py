@@ -121,7 +121,7 @@ class WholeRecord:
         return Response(JoinedSweep(record, free), given, start, start_factorisations=1)
 
     def _momentum_beside(self, driven: Response, derivative: int) -> PETSc.Vec:
-        """SᵀM_p times what the points' displacement or velocity differs from the driven one by."""
+        """Momentum SᵀM_p of what the points' displacement or velocity differs from the driven one by."""
         points, S = self._points, transfer_matrix(self._points, self._domain.V)
         carried = points["dynamic_velocity" if derivative else "dynamic_displacement"]
         nodal = self._equations.expand(driven.unknowns_at(0.0, derivative))
@@ -131,18 +131,19 @@ class WholeRecord:
 
     def _starts(self, equations: LapseEquations, w: PETSc.Vec, rate: PETSc.Vec) -> Columns:
         """c of the start functions of the free vibration, from its two momenta."""
-        viscous = [(C, 1.0) for C in equations.viscous]
+        viscous = [(C, -1.0) for C in equations.viscous]
+        stiff = [(K, -share) for K, share in equations.stiff]
+        displacement, velocity = self._equations.accelerate(w), self._equations.accelerate(rate)
+        force = product(stiff, displacement, like=w)
+        force.axpy(1.0, slowed := product(viscous, velocity, like=w))
+        change = product(stiff, velocity, like=w)
         with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
-            found = [accelerate(w), accelerate(rate)]
-            for _ in range(2):
-                pull = product(viscous, found[-1], like=w)
-                spring = product(equations.stiff, found[-2], like=w)
-                pull.axpy(1.0, spring)
-                pull.scale(-1.0)
-                found.append(accelerate(pull))
-                pull.destroy()
-                spring.destroy()
-        return start_columns(self._start, found)
+            acceleration = accelerate(force, change)
+            change.axpy(1.0, damped := product(viscous, acceleration, like=w))
+            jerk = accelerate(change)
+        for vector in (force, slowed, change, damped):
+            vector.destroy()
+        return start_columns(self._start, [displacement, velocity, acceleration, jerk])
 
     def carried(self, material: Material) -> None:
         """Nothing: the response is total."""

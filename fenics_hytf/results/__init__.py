@@ -7,11 +7,13 @@ the folder alone, so that they can be drawn again later.
 
 from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.folder import (
+    CHECKPOINT,
     FINISHED,
     PARTIAL,
     ResultError,
     ResultFolder,
     folder_faults,
+    is_result_of,
     locked,
     open_result,
 )
@@ -26,6 +28,7 @@ from fenics_hytf.results.reader import (
 from fenics_hytf.results.summary import moving_components, summarise
 
 __all__ = [
+    "CHECKPOINT",
     "FINISHED",
     "PARTIAL",
     "ResultError",
@@ -33,6 +36,7 @@ __all__ = [
     "StoredResult",
     "describe_scene",
     "folder_faults",
+    "is_result_of",
     "locked",
     "moving_components",
     "open_result",

@@ -26,15 +26,23 @@ _UNITS = {
 }
 
 
-def describe_scene(scene: Scene) -> dict[str, Any]:
+def describe_scene(scene: Scene, region_names: tuple[str, ...]) -> dict[str, Any]:
     """The scene as the report and the figures need it, and as its file says it.
 
     Args:
         scene: The scene.
+        region_names: Soils of the mesh.
 
     Returns:
-        Plain values.
+        Plain values. ``scheme`` says how lapses hang together, see
+        :class:`fenics_hytf.simulation.Scheme`; ``contour`` is the damped contour on which they are
+        solved, or ``None``.
     """
+    # what solves is loaded where something was solved, not where a result is read
+    from fenics_hytf.simulation.scheme import scheme_of
+
+    scheme = scheme_of(scene, region_names)
+    contour = scheme.contour
     effects, solver, boundary = scene.effects, scene.solver, scene.boundary
     loop = effects.equivalent_linear
     names = scene.mesh.boundaries or tuple(dict.fromkeys(("base", *boundary.kinds)))
@@ -45,11 +53,16 @@ def describe_scene(scene: Scene) -> dict[str, Any]:
         "boundary": {name: boundary.kinds.get(name, default_kind(name)) for name in names},
         "rock": None if boundary.rock is None else boundary.rock.model_dump(),
         "continuity": scene.lapses.continuity,
+        "scheme": scheme.name,
+        "contour": None
+        if contour is None
+        else {"eta_1_s": contour.eta, "period_s": contour.period * contour.dt},
         "loop_tolerance": None if loop is None else loop.tolerance,
         "strain_ratio": None if loop is None else loop.strain_ratio,
         "magnitude": None if loop is None else loop.magnitude,
         "strain_measure": "plane" if loop is None else loop.strain,
         "rayleigh": None if effects.rayleigh is None else effects.rayleigh.model_dump(),
+        "degradation": None if effects.degradation is None else effects.degradation.model_dump(),
         "calm": None if effects.calm is None else effects.calm.model_dump(),
         "water_table_m": scene.output.water_table,
         "solver": solver.model_dump(),

@@ -4,7 +4,9 @@
 A folder is locked (``flock`` on a file in it) while a run writes. It is finished when it holds
 ``summary.json``, which is written last and put in place by one rename: a reader sees the whole
 file or none. A finished result is refused unless forced, and even then nothing of it is touched
-before there is something new to write.
+before there is something new to write. A run that is under way, or was stopped, has a checkpoint
+in the folder; it goes when the run is finished. An unfinished run is refused unless it is resumed,
+or forced to start anew.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import json
 import os
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
@@ -31,18 +33,21 @@ if TYPE_CHECKING:
 FINISHED = "summary.json"
 PARTIAL = "partial-summary.json"
 LOCK = ".hytf.lock"
+CHECKPOINT = "checkpoint"
 
+_CHECKPOINTS = f"{CHECKPOINT}/*.npz"
+_SNAPSHOTS = ("points_*.vtu", "fields_*.vtu")
 # what a run may leave in its folder, and so what a forced run removes; nothing else is touched
 _OURS = (
     FINISHED,
     PARTIAL,
+    f"{_CHECKPOINTS}*",
+    *_SNAPSHOTS,
     "receivers.csv",
     "base.csv",
     "transfer.csv",
     "spectra.csv",
     "cells.csv",
-    "points_*.vtu",
-    "fields_*.vtu",
     "histories_*.png",
     "transfer_*.png",
     "spectra_*.png",
@@ -51,6 +56,8 @@ _OURS = (
     "profiles.png",
     "profiles_peaks.png",
     "section.png",
+    "stiffness.png",
+    "energy.png",
     "convergence.png",
     "report.html",
 )
@@ -62,12 +69,13 @@ class ResultError(ValueError):
     """A result folder cannot be used; ``str()`` says which, why, and what to do."""
 
 
-def folder_faults(folder: Path, force: bool) -> list[str]:
+def folder_faults(folder: Path, force: bool, resume: bool = False) -> list[str]:
     """What speaks against writing a result to a folder; touches nothing.
 
     Args:
         folder: Where the result should go.
-        force: Whether a finished result there may be replaced.
+        force: Whether a finished result or an unfinished run there may be replaced.
+        resume: Whether an unfinished run there is gone on with.
 
     Returns:
         The faults, empty if there are none.
@@ -77,6 +85,12 @@ def folder_faults(folder: Path, force: bool) -> list[str]:
             return [
                 f"{folder}: found a finished result ({FINISHED}); expected a folder without one. "
                 "Choose another with -o, or replace it with --force"
+            ]
+        if not (force or resume) and any(folder.glob(_CHECKPOINTS)):
+            return [
+                f"{folder}: found an unfinished run (it has a {CHECKPOINT}); expected a folder "
+                "without one. Go on with --resume, start anew with --force, or choose another "
+                "with -o"
             ]
         place = folder
     else:
@@ -88,19 +102,34 @@ def folder_faults(folder: Path, force: bool) -> list[str]:
     return []
 
 
-def open_result(folder: Path, force: bool = False) -> ResultFolder:
+def is_result_of(folder: Path, scene_hash: str) -> bool:
+    """Whether a folder holds a finished result of the very same scene.
+
+    Args:
+        folder: The folder.
+        scene_hash: Hash of the scene.
+    """
+    try:
+        summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(summary, dict) and summary.get("scene_hash") == scene_hash
+
+
+def open_result(folder: Path, force: bool = False, resume: bool = False) -> ResultFolder:
     """Take a folder for writing a result: create it if needed, and lock it.
 
     Args:
         folder: Where the result goes; parents are created as well.
-        force: Whether a finished result there may be replaced.
+        force: Whether a finished result or an unfinished run there may be replaced.
+        resume: Whether an unfinished run there is gone on with.
 
     Returns:
         The open folder; close it, or use it in a ``with`` statement.
 
     Raises:
         ResultError: If the folder cannot be created or written, another run writes there, or it
-            holds a finished result and ``force`` is not given. Nothing is changed then.
+            holds what may not be replaced. Nothing is changed then.
     """
     faults = folder_faults(folder, force=True)
     if faults:
@@ -116,7 +145,7 @@ def open_result(folder: Path, force: bool = False) -> ResultFolder:
             "that can be. Choose another with -o"
         ) from error
     result = ResultFolder(folder, lock, missing)
-    faults = folder_faults(folder, force)  # again, now that no other run can finish in between
+    faults = folder_faults(folder, force, resume)  # now that no other run can finish in between
     if faults:
         result.close()
         raise ResultError(faults[0])
@@ -161,13 +190,16 @@ class ResultFolder:
 
     Attributes:
         path: The folder.
+        checkpoint: Folder of the run's checkpoint in it.
     """
 
     def __init__(self, path: Path, lock: IO[str], created: list[Path]) -> None:
         self.path = path
+        self.checkpoint = path / CHECKPOINT
         self._lock: IO[str] | None = lock
         self._created = created
         self._cleared = False
+        self._kept: tuple[str, ...] = ()
 
     def __enter__(self) -> ResultFolder:
         return self
@@ -180,17 +212,32 @@ class ResultFolder:
     ) -> None:
         self.close()
 
+    def go_on(self) -> None:
+        """Keep the checkpoint and the snapshots that are there: they are this run's."""
+        self._kept = (f"{_CHECKPOINTS}*", *_SNAPSHOTS)
+
+    def clear(self) -> None:
+        """Remove what there is of an earlier result, ``summary.json`` first; once.
+
+        To be called before anything is written from elsewhere; the methods here do so themselves.
+        """
+        if not self._cleared:
+            self._remove(pattern for pattern in _OURS if pattern not in self._kept)
+            self._cleared = True
+
     def snapshot(self, snapshot: Snapshot) -> None:
         """Write the points and fields of a lapse for ParaView.
 
         Args:
             snapshot: As gathered on one rank.
         """
-        self._clear()
+        self.clear()
         write_snapshot(self.path, snapshot)
 
     def write(self, result: Result, finish: Finish | None = None) -> dict[str, Any]:
         """Write a finished simulation: tables first, ``summary.json`` last.
+
+        The run's checkpoint goes then: there is nothing left to go on with.
 
         Args:
             result: The simulation.
@@ -200,7 +247,11 @@ class ResultFolder:
         Returns:
             The summary as written.
         """
-        return self._write(result, FINISHED, finish)
+        try:
+            return self._write(result, FINISHED, finish)
+        finally:
+            if (self.path / FINISHED).exists():
+                self._remove([f"{_CHECKPOINTS}*"])
 
     def write_partial(self, result: Result) -> dict[str, Any]:
         """Write what a simulation that stopped has reached, with ``partial-summary.json``.
@@ -219,11 +270,12 @@ class ResultFolder:
             (self.path / LOCK).unlink(missing_ok=True)
             self._lock.close()
             self._lock = None
+            _remove_empty([self.checkpoint])
             _remove_empty(self._created)
 
     def _write(self, result: Result, name: str, finish: Finish | None) -> dict[str, Any]:
         start = time.perf_counter()
-        self._clear()
+        self.clear()
         write_tables(self.path, result)
         summary = summarise(result)
         before = summary["wall_s"].get("output", 0.0)
@@ -242,13 +294,11 @@ class ResultFolder:
             replace_file(self.path / name, text + "\n")
         return summary
 
-    def _clear(self) -> None:
-        """Remove an earlier result, ``summary.json`` first; once, before the first file."""
-        if not self._cleared:
-            for pattern in _OURS:
-                for file in self.path.glob(pattern):
-                    file.unlink()
-            self._cleared = True
+    def _remove(self, patterns: Iterable[str]) -> None:
+        for pattern in patterns:
+            for file in self.path.glob(pattern):
+                file.unlink()
+        _remove_empty([self.checkpoint])
 
 
 def replace_file(path: Path, text: str) -> None:

@@ -37,9 +37,10 @@ def layer_states(
         ``elevation_m`` (lowest and highest cell centre); the smallest and largest
         ``effective_strain``, ``g_over_gmax``, ``damping``, ``peak_acceleration_m_s2``; ``change``,
         the largest final change of the loop, and whether it ``converged``, both ``None`` without a
-        loop.
+        loop; the smallest and largest ``degradation`` index, ``None`` where nothing degrades.
     """
     cells, loop = lapse.cells, scene.effects.equivalent_linear
+    index = cells.degradation
     found = (
         _column(scene, cells) if scene.mesh.column is not None else _regions(region_names, cells)
     )
@@ -56,6 +57,7 @@ def layer_states(
                 "peak_acceleration_m_s2": _range(cells.peak_acceleration[member]),
                 "change": None if loop is None else change,
                 "converged": None if loop is None else change <= loop.tolerance,
+                "degradation": None if index is None else _range(index[member]),
             }
         )
     return states

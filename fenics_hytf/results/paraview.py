@@ -2,8 +2,10 @@
 """Material points and nodal fields of a lapse as VTU files for ParaView.
 
 ``points_NNNN.vtu`` and ``fields_NNNN.vtu``, NNNN the number of the lapse from 0. Places and vectors
-of plane problems get a third component, zero. A number that does not exist (no soil in a cell) is
-written as 0 and marked by a 0 in an array ``has_NAME``.
+of plane problems get a third component, zero. What points carry over seams is called
+``dynamic_...``: relative to the motion that is given, strain and stress as Voigt columns, shear
+strain as γ = 2ε. A number that does not exist (no soil in a cell) is written as 0 and marked by a 0
+in an array ``has_NAME``.
 """
 
 from __future__ import annotations

@@ -19,16 +19,20 @@ import numpy as np
 import fenics_hytf
 from fenics_hytf.motion import GRAVITY, Intensity, intensity_measures
 from fenics_hytf.results.definition import describe_scene
+from fenics_hytf.results.energy import ledger, totals, worst_seam_error
 from fenics_hytf.results.layers import layer_states
 from fenics_hytf.results.writers import QUANTITIES, base_motions
-from fenics_hytf.soil import LimitedCurve
+from fenics_hytf.soil import HELD_DAMPING, LimitedCurve
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
     from fenics_hytf.simulation import Result
 
-FORMAT = 2
-"""Raised when a key of the summary changes its meaning."""
+FORMAT = 3
+"""Raised when a key of the summary changes its meaning, or one that is read is new."""
+
+_SEAM_ERROR = 0.01  # of the peaks; seams of sound lapses are some 1e-4 off
+_IMBALANCE = 0.01  # of the energy that comes in
 
 _ROUNDING = 1e-9  # of the largest peak: below, a component does not move
 
@@ -61,7 +65,7 @@ def summarise(result: Result) -> dict[str, Any]:
         "ranks": result.num_ranks,
         "group_size": result.group_size,
         "scene_hash": result.scene.hash,
-        "scene": describe_scene(result.scene),
+        "scene": describe_scene(result.scene, result.region_names),
         "effects": list(result.scene.effects.named),
         "sizes": result.sizes,
         "components": result.components,
@@ -74,6 +78,8 @@ def summarise(result: Result) -> dict[str, Any]:
         "base": _base(result),
         "receivers": _receivers(result),
         "lapses": [_lapse(result, lapse) for lapse in result.lapses],
+        "worst_seam_error": worst_seam_error(result.lapses),
+        "energy": totals(result.lapses, _gdim(result)),
         "peaks": _peaks(result),
         "intensity": _intensity(result),
         "work": work,
@@ -111,6 +117,32 @@ def warnings(result: Result) -> list[str]:
                 "linear analysis is outside the range it was made for."
             )
     found += _exceeded_strengths(result)
+    found += _seam_warnings(result)
+    return found
+
+
+def _seam_warnings(result: Result) -> list[str]:
+    """Seams that are felt, energy that is not balanced, damping that the law does not hold."""
+    found = []
+    error = worst_seam_error(result.lapses)
+    if error is not None and error > _SEAM_ERROR:
+        found.append(
+            f"Displacement or velocity jumps at a seam between lapses by {100 * error:.2g} % of "
+            "its peak. Longer lapses, or a higher solver.max_frequency, make jumps smaller."
+        )
+    energy = totals(result.lapses, _gdim(result))
+    if energy is not None and (energy["worst_imbalance"] or 0.0) > _IMBALANCE:
+        found.append(
+            f"The energy of a lapse is off balance by {100 * energy['worst_imbalance']:.2g} % of "
+            "what comes in."
+        )
+    if result.scene.solver.complex_modulus == "maxwell":
+        damping = max(float(np.nanmax(i.cells.damping, initial=0.0)) for i in result.lapses)
+        if damping > HELD_DAMPING:
+            found.append(
+                f"Damping ratios reach {100 * damping:.2g} %. Above {100 * HELD_DAMPING:g} % the "
+                "four branches of the Maxwell law no longer hold the loss factor."
+            )
     return found
 
 
@@ -261,8 +293,14 @@ def _intensity(result: Result) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def _seams(result: Result) -> list[int]:
-    """First sample of each lapse, which is a periodic state of its own."""
+    """First samples of what is a periodic state of its own: each lapse, or the whole record."""
+    if result.scene.lapses.continuity == "transient":
+        return [0]
     return [round(lapse.start_time / result.dt) for lapse in result.lapses]
+
+
+def _gdim(result: Result) -> int:
+    return int(result.lapses[0].cells.centroid.shape[1])
 
 
 def _with_units(measures: Intensity) -> dict[str, float]:
@@ -285,7 +323,7 @@ def _receivers(result: Result) -> dict[str, Any]:
 
 
 def _lapse(result: Result, lapse: LapseResult) -> dict[str, Any]:
-    change = lapse.loop.change
+    change, degradation = lapse.loop.change, lapse.cells.degradation
     return {
         "index": lapse.index,
         "start_time_s": lapse.start_time,
@@ -300,6 +338,9 @@ def _lapse(result: Result, lapse: LapseResult) -> dict[str, Any]:
         "worst_cell": lapse.loop.worst_cell,
         "layers": layer_states(result.scene, result.region_names, lapse),
         "worst_residual": lapse.worst_residual,
+        "seam_error": lapse.seam_error,
+        "energy": ledger(lapse.energy, _gdim(result)),
+        "degradation": None if degradation is None else np.nanmin(degradation),
         "points_lost": lapse.ledger.deleted,
         "points_parked": lapse.ledger.parked,
         "mass_ledger": lapse.ledger.as_dict(),

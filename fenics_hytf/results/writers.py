@@ -173,7 +173,10 @@ CELL_VALUES = (
     "stress_ratio",
     "change",
 )
-"""Columns of ``cells.csv`` after the place: of a cell's state, and what the overburden adds."""
+"""Columns of ``cells.csv`` after the place: of a cell's state, and what the overburden adds.
+
+Where cycles degrade soils ``degradation`` follows.
+"""
 
 
 def _cells(result: Result) -> tuple[list[str], Rows]:
@@ -182,6 +185,9 @@ def _cells(result: Result) -> tuple[list[str], Rows]:
     places = ["x", "y", "z"][: centroid.shape[1]]
     names = np.array(result.region_names, dtype=object)
     overburden = vertical_stress(result.scene, centroid)
+    columns: tuple[str, ...] = CELL_VALUES
+    if result.lapses[0].cells.degradation is not None:
+        columns += ("degradation",)
 
     def block(lapse: LapseResult) -> Rows:
         cells = lapse.cells
@@ -195,9 +201,9 @@ def _cells(result: Result) -> tuple[list[str], Rows]:
                 np.arange(count),
                 names[cells.region],
                 *centroid.T,
-                *(values[name] for name in CELL_VALUES),
+                *(values[name] for name in columns),
             ]
         )
 
     rows = (row for lapse in result.lapses for row in block(lapse))
-    return ["lapse", "cell", "region", *places, *CELL_VALUES], rows
+    return ["lapse", "cell", "region", *places, *columns], rows

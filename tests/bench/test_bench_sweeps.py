@@ -33,7 +33,7 @@ from fenics_hytf.frequency import (
     direct_sweep,
     reduced_sweep,
 )
-from fenics_hytf.lapse import Equations, complex_constants, seed_points
+from fenics_hytf.lapse import Equations, material, seed_points
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(3600)]
 
@@ -163,7 +163,7 @@ def test_error_at_every_tenth_line_and_at_resonances(ground, tmp_path, figure):
     equations.weigh(points)
     soil = random_ground(case, domain, points)
     moduli = soil.secant(np.zeros(domain.num_cells))
-    lapse = equations.assemble(soil, *complex_constants(soil, moduli, "hysteretic", "poisson"))
+    lapse = equations.assemble(soil, material(soil, moduli, case.solver))
     # The lowest, and those about the middle of the band.
     middle = np.pi * case.solver.max_frequency
     found = [natural_frequencies(lapse.system, omega, MODES // 2) for omega in (0.0, middle)]

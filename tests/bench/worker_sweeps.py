@@ -23,12 +23,12 @@ from support.meshes import scene
 from support.reference import comb
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.frequency import Sweep
-from fenics_hytf.lapse import CellPeaks, CellProbe, Excitation, Ground, survey
+from fenics_hytf.lapse import CellPeaks, CellProbe, Ground, Response, survey
 from fenics_hytf.particles import Points
 from fenics_hytf.results import open_result
 from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import flow, peak_memory, simulate
+from fenics_hytf.simulation import peak_memory, simulate
+from fenics_hytf.simulation import run as steps
 
 SOIL = {"density": 1900.0, "shear_wave_velocity": 250.0, "poisson": 0.3}
 
@@ -114,11 +114,11 @@ def _time_peaks() -> dict[str, float]:
     taken: dict[str, float] = {}
     peaks = CellProbe.peaks
 
-    def timed(probe: CellProbe, sweep: Sweep, excitation: Excitation, *more: object) -> CellPeaks:
+    def timed(probe: CellProbe, response: Response, *more: object) -> CellPeaks:
         start = time.perf_counter()
-        probe.peak_strain(sweep, excitation)
+        probe.peak_strain(response)
         middle = time.perf_counter()
-        found = peaks(probe, sweep, excitation, *more)
+        found = peaks(probe, response, *more)
         taken.update(strain=middle - start, peaks=time.perf_counter() - middle)
         return found
 
@@ -137,7 +137,7 @@ def measure(order: dict) -> dict | None:
     """
     order = {**order}
     options = {"group_size": order.pop("group_size")} if "group_size" in order else {}
-    flow.survey = random_ground
+    steps.survey = random_ground
     taken = _time_peaks()
     comm = MPI.COMM_WORLD
     with tempfile.TemporaryDirectory() as name:

@@ -20,7 +20,7 @@ from support.meshes import MOTION, scene
 
 from fenics_hytf.domain import build
 from fenics_hytf.frequency import Sweep, direct_sweep, reduced_sweep
-from fenics_hytf.lapse import Equations, complex_constants, seed_points, survey
+from fenics_hytf.lapse import Equations, material, seed_points, survey
 
 CONTRAST = 1e6
 WANTED = 1e-9
@@ -66,9 +66,7 @@ class Ground:
         self.equations.weigh(points)
         ground = survey(case, domain, points)
         moduli = ground.secant(np.zeros(domain.num_cells))
-        lapse = self.equations.assemble(
-            ground, *complex_constants(ground, moduli, "hysteretic", "poisson")
-        )
+        lapse = self.equations.assemble(ground, material(ground, moduli, case.solver))
         self.system, self.loads = lapse.system, lapse.loads
         self.b = lapse.loads[0].array_r.copy()
 

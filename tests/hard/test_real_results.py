@@ -16,7 +16,7 @@ from support.meshes import SOIL, scene
 
 from fenics_hytf.domain import build
 from fenics_hytf.frequency import direct_sweep, reduced_sweep
-from fenics_hytf.lapse import Equations, complex_constants, excite, seed_points, survey
+from fenics_hytf.lapse import Equations, Response, excite, material, seed_points, survey
 from fenics_hytf.motion import spectra
 from fenics_hytf.operators import constrained_rows, displacement_rows
 from fenics_hytf.particles import transfer_matrix
@@ -100,8 +100,7 @@ class Lapse:
         self.equations.weigh(self.points)
         ground = survey(case, self.domain, self.points)
         moduli = ground.secant(np.zeros(self.domain.num_cells))
-        law = case.solver.complex_modulus, case.solver.keep
-        lapse = self.equations.assemble(ground, *complex_constants(ground, moduli, *law))
+        lapse = self.equations.assemble(ground, material(ground, moduli, case.solver))
         self.system, self.loads = lapse.system, lapse.loads
         motions = np.stack([motion.record.acceleration for motion in case.motion])
         self.excitation = excite(case, motions, self.equations.axes)
@@ -155,7 +154,7 @@ def test_20_positions_are_real(name, tmp_path, figure):
         dropped = max(dropped, float(np.abs(points.imag).max()))
         moved = max(moved, float(np.abs(points.real).max()))
         # The code's own way, from one sign of ω, is the same displacement.
-        taken = lapse.equations.expand(one.combine(excitation.weights_at(time)))
+        taken = lapse.equations.expand(Response(one, excitation).unknowns_at(time))
         np.testing.assert_allclose(
             S @ taken.ravel(), points.real, rtol=0, atol=1e-12 * np.abs(points.real).max()
         )

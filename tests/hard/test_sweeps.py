@@ -13,7 +13,7 @@ from support.meshes import SOIL, scene
 
 from fenics_hytf.domain import build
 from fenics_hytf.frequency import SweepError, direct_sweep, reduced_sweep
-from fenics_hytf.lapse import Equations, Moduli, complex_constants, seed_points, survey
+from fenics_hytf.lapse import Equations, Moduli, material, seed_points, survey
 
 MOTION = {"harmonic": {"amplitude": 1.0, "frequency": 1.0, "cycles": 1, "samples": 8}}
 TOLERANCE = 1e-6
@@ -37,8 +37,7 @@ class Section:
         ground = survey(case, domain, points)
         spread = np.exp(0.4 * np.random.default_rng(7).normal(size=domain.num_cells))
         moduli = Moduli(spread * ground.shear_modulus, ground.damping)
-        parts = complex_constants(ground, moduli, "hysteretic", "poisson")
-        lapse = self.equations.assemble(ground, *parts)
+        lapse = self.equations.assemble(ground, material(ground, moduli, case.solver))
         self.system, self.loads = lapse.system, lapse.loads
 
     def frequencies(self, count: int) -> np.ndarray:

@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
 from fenics_hytf.particles import MassLedger
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Result, Snapshot, Work
 
 COMPONENTS = ("x", "y", "z")
+DEGRADES = {"equivalent_linear": True, "degradation": {"threshold": 1e-4, "soils": ["fill"]}}
 ROCK = {"density": 2243.0, "shear_wave_velocity": 760.0, "poisson": 0.25, "damping": 0.01}
 
 
@@ -23,9 +27,10 @@ def make_scene(
     receivers=3,
     samples=240,
     compliant=False,
+    continuity=None,
     **extra,
 ):
-    """A valid scene; compliant: on rock, under outcrop motions."""
+    """A valid scene; compliant: on rock, under outcrop motions; continuity: if not the default."""
     sand = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "damping": 0.02}
     fill = {**sand, "shear_wave_velocity": 150.0}
     if loop:
@@ -55,7 +60,7 @@ def make_scene(
         "mesh": mesh,
         "soil": {"sand": sand, "fill": fill},
         "motion": [{"direction": d, **given} for d in directions],
-        "lapses": {"count": lapses},
+        "lapses": {"count": lapses} | ({"continuity": continuity} if continuity else {}),
         "output": {"receivers": places},
         **({"effects": {"equivalent_linear": True}} if loop else {}),
         **({"boundary": {"base": {"compliant": ROCK}}} if compliant else {}),
@@ -65,7 +70,11 @@ def make_scene(
 
 
 def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", **more):
-    """A result with smooth histories, three excited lines' worth of resonance, plausible cells."""
+    """A result with smooth histories, three excited lines' worth of resonance, plausible cells.
+
+    Transient lapses have seam errors and, under the Maxwell law, energy; where soils degrade they
+    lose 2 % a lapse.
+    """
     scene = make_scene(directions, lapses, loop, gdim, kind, **more)
     receivers = tuple(scene.output.receivers)
     places = np.array([scene.output.receivers[r].place for r in receivers]).reshape(-1, gdim)
@@ -85,7 +94,12 @@ def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", *
         dt=dt,
         base_acceleration=base,
         lapses=tuple(
-            _lapse(i, samples // lapses, dt, base, directions, places, loop, components, kind, rock)
+            _handed_over(
+                scene,
+                _lapse(
+                    i, samples // lapses, dt, base, directions, places, loop, components, kind, rock
+                ),
+            )
             for i in range(lapses)
         ),
         sizes={"cells": _centroids(gdim, kind).shape[0], "unknowns": 60, "points": 56},
@@ -182,8 +196,33 @@ def _lapse(index, samples, dt, base, directions, places, loop, components, kind,
             peak_displacement=0.02 * np.exp(-depth / 8.0),
             change=np.where(region == 1, 7e-4, 2e-4) if loop else np.zeros_like(ratio),
         ),
+        seam_error=None,
+        energy=None,
         ledger=MassLedger(56, 44_040.0, 0, 0.0, 0, 0.0, 0, 44_040.0, 0.0),
     )
+
+
+def _handed_over(scene, lapse):
+    """The lapse as its scene's continuity, law and degradation make it."""
+    i, more = lapse.index, {}
+    if scene.lapses.continuity == "transient":
+        more["seam_error"] = 1e-4 * (1 + i % 3) if i else None
+        if scene.solver.complex_modulus == "maxwell":
+            stored = [0.0, *(100.0 * np.sin(0.3 * (1 + i)) ** 2 for i in range(i + 1))]
+            rest, seam = (8.0 - 2.0 * i, 5.0 - i) if i else (0.0, 0.0)
+            start, end = (stored[i] + seam, stored[i + 1])
+            given = 400.0 * np.exp(-(((i - 2) / 3.0) ** 2))
+            damping = given - rest - (end - start) - 1e-3
+            kinetic, strain = (0.4 * start, 0.4 * end), (0.6 * start, 0.6 * end)
+            more["energy"] = Energy(given, damping, rest, kinetic, strain, seam)
+    if scene.effects.degradation is not None:
+        index = np.where(lapse.cells.region == 1, 0.98**i, 1.0)
+        modulus, ratio = (
+            index * getattr(lapse.cells, name) for name in ("shear_modulus", "g_over_gmax")
+        )
+        cells = {"degradation": index, "shear_modulus": modulus, "g_over_gmax": ratio}
+        more["cells"] = replace(lapse.cells, **cells)
+    return replace(lapse, **more)
 
 
 def _centroids(gdim, kind):

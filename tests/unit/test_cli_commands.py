@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -61,7 +62,7 @@ def files(folder):
 
 
 def replace_simulate(monkeypatch, action):
-    def simulate(scene, comm, progress, snapshot, group_size):
+    def simulate(scene, comm, progress, snapshot, group_size, checkpoint=None):
         return action(snapshot)
 
     monkeypatch.setattr(run, "simulate", simulate)
@@ -76,6 +77,31 @@ def test_run_writes_a_finished_result(here, hytf):
     assert summary["work"]["factorisations"] == 1 and summary["lapses"][0]["solved_lines"] == 1
     assert "rayleigh" not in summary["work"]["assemblies"]
     assert Path("s-result/report.html").exists() and Path("s-result/points_0000.vtu").exists()
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (
+            ("solver.complex_modulus='maxwell'",),
+            r"error of a seam at most \d\.\de-\d+ \(estimate\), energy of a lapse off by at most "
+            r"\d\.\de-\d+ of input",
+        ),
+        (
+            ("solver.complex_modulus='hysteretic'",),
+            r"error of a seam at most \d\.\de-\d+ .estimate.",
+        ),
+        (("lapses.continuity='steady'",), None),
+    ],
+    ids=str,
+)
+def test_a_transient_run_ends_with_its_seams(here, hytf, settings, words):
+    transient = ("lapses.count=2", "lapses.continuity='transient'")
+    code, out, err = hytf("run", "s.toml", "--no-plots", "--set", *transient, *settings)
+    assert code == 0, err
+    rows = [line for line in out.splitlines() if line.startswith("  seams ")]
+    assert len(rows) == (words is not None)
+    assert words is None or re.fullmatch(f"  seams       {words}", rows[0])
 
 
 def test_quiet_says_nothing(here, hytf):
@@ -116,10 +142,10 @@ def test_every_fault_is_told_at_once_and_nothing_written(here, hytf):
         (("s.toml", "-o", "x" * 300), "cannot be written"),
         (("s.toml", "--set", "output.receivers.top=[0.5, 9.0]"), "top"),
         (("s.toml", "--set", "nonsense"), "nonsense"),
-        (("s.toml", "--resume"), "--resume: not in this version"),
         (("s.toml", "--group-size", "2"), "group size: found 2, with 1 rank; expected one of 1"),
         (("s.toml", "--group-size", "0"), "group size: found 0"),
-        (("s.toml", "--set", 'lapses.continuity="transient"'), "not in this version"),
+        (("s.toml", "--set", "effects.gravity=true"), "not in this version"),
+        (("s.toml", "--set", 'lapses.continuity="cyclic"'), '"steady" or "transient"'),
         (("s.toml", "--bogus"), "bogus"),
         ((), "SCENE"),
     ],
@@ -234,6 +260,8 @@ def test_check_says_ok_and_what_it_takes(here, hytf):
     assert words["lapses"] == "1 of 32 samples"
     assert words["lines"].split() == ["to", "solve", "1"]
     assert "memory" in words and words["effects"] == "none"
+    assert words["continuity"].startswith("steady (the default for one lapse)")
+    assert words["complex"] == "modulus hysteretic (the default)"
     assert [p.name for p in here.iterdir()] == ["s.toml"]
 
 

@@ -104,7 +104,6 @@ def test_another_file_of_that_name_is_never_overwritten(here, hytf, name):
         ("nothing",),
         ("sine", "--motion", "nowhere.at2"),
         ("sine", "--set", "title=1"),
-        ("sine", "--resume"),
         ("other",),
     ],
 )
@@ -119,6 +118,15 @@ def test_another_motion(here, hytf):
     assert hytf("demo", "sine", "--motion", "mine.csv", "--no-plots", "-o", "r")[0] == 0
     summary = json.loads(Path("r/summary.json").read_text())
     assert "mine" in summary["motions"][0]["name"]
+
+
+def test_a_demo_is_gone_on_with_until_it_is_finished(here, hytf):
+    code, _, err = hytf("demo", "sine", "--resume", "--no-plots")
+    assert code == 0 and "starting at the first lapse" in err
+    code, out, err = hytf("demo", "sine", "--resume")
+    assert (code, out) == (0, "") and "finished already" in err
+    code, out, err = hytf("demo", "sine", "--resume", "--set", "soil.sand.damping=0.04")
+    assert (code, out) == (2, "") and "found a finished result" in err
 
 
 def test_demos_are_found_beside_the_package():

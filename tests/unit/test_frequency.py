@@ -30,7 +30,7 @@ from fenics_hytf.frequency import (
     direct_sweep,
     hysteretic,
 )
-from fenics_hytf.lapse import ElasticConstants, Equations, survey
+from fenics_hytf.lapse import ElasticConstants, Equations, Material, Part, survey
 from fenics_hytf.particles import default_points_per_cell, seed
 from fenics_hytf.scene import Scene
 
@@ -399,9 +399,13 @@ def test_stiffness_contrast_of_a_million(cell, damping, package, figure):
     region = domain.gather_cells(domain.regions)
     shear = np.array([soil.elastic.shear_modulus for soil in soils])[region]
     lame = np.array([soil.elastic.lame_lambda for soil in soils])[region]
-    imaginary = ElasticConstants(2 * damping * lame, 2 * damping * shear) if damping else None
+    real = ElasticConstants(lame, shear)
+    parts = [Part("real", real, constant)]
+    if damping:
+        imaginary = ElasticConstants(2 * damping * lame, 2 * damping * shear)
+        parts.append(Part("imaginary", imaginary, hysteretic))
     soil = survey(case, domain, points)
-    lapse = equations.assemble(soil, ElasticConstants(lame, shear), imaginary)
+    lapse = equations.assemble(soil, Material(real, tuple(parts)))
     lines = 2j * np.pi * np.array([0.0, 0.1, 0.7, 2.3, 9.1, 27.0, 50.0])
     sweep = direct_sweep(lapse.system, lapse.loads, lines, tolerance=1e-9)
     (b,) = lapse.loads

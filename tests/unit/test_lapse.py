@@ -11,15 +11,19 @@ from scipy.spatial.transform import Rotation
 from support.meshes import SOIL, scene
 
 from fenics_hytf.domain import build, constraint_matrix
+from fenics_hytf.frequency import constant, hysteretic
 from fenics_hytf.lapse import (
     Anderson,
     CellProbe,
+    ElasticConstants,
     EmptyCellError,
     EquivalentLinearError,
     Excitation,
     Ground,
-    Moduli,
-    complex_constants,
+    Material,
+    Part,
+    Response,
+    Spectra,
     excite,
     first_strain,
     iterate,
@@ -411,72 +415,25 @@ def test_an_empty_cell_is_named_on_every_rank():
         survey(case, domain, points)
 
 
-# ---------------------------------------------------------------- complex constants
-
-FACTORS = {
-    "hysteretic": lambda D: 1 + 2j * D,
-    "kramer": lambda D: 1 - D**2 + 2j * D,
-    "shake91": lambda D: 1 - 2 * D**2 + 2j * D * np.sqrt(1 - D**2),
-    "dormieux": lambda D: np.sqrt(1 - 4 * D**2) + 2j * D,
-}
-MIXED = Ground(
-    np.zeros(3, np.int32),
-    np.full(3, 1800.0),
-    np.array([50e6, 80e6, 20e6]),
-    np.array([0.0, 0.3, 0.49]),
-    np.zeros(3),
-    (None,),
-)
-SECANT = Moduli(np.array([30e6, 80e6, 5e6]), np.array([0.1, 0.0, 0.24]))
-
-
-@pytest.mark.parametrize("convention", FACTORS)
-def test_keeping_poissons_ratio(convention):
-    real, imaginary = complex_constants(MIXED, SECANT, convention, "poisson")
-    G = real.shear_modulus + 1j * imaginary.shear_modulus
-    lame = real.lame_lambda + 1j * imaginary.lame_lambda
-    np.testing.assert_allclose(G, SECANT.shear_modulus * FACTORS[convention](SECANT.damping))
-    np.testing.assert_allclose(lame / (2 * (lame + G)), MIXED.poisson, atol=4 * EPS)  # ν, real
-
-
-@pytest.mark.parametrize("convention", FACTORS)
-def test_keeping_the_bulk_modulus(convention):
-    real, imaginary = complex_constants(MIXED, SECANT, convention, "bulk")
-    G = real.shear_modulus + 1j * imaginary.shear_modulus
-    bulk = real.lame_lambda + 1j * imaginary.lame_lambda + 2 / 3 * G
-    np.testing.assert_allclose(G, SECANT.shear_modulus * FACTORS[convention](SECANT.damping))
-    nu = MIXED.poisson
-    expected = 2 * MIXED.shear_modulus * (1 + nu) / (3 * (1 - 2 * nu))  # small strain, undamped
-    np.testing.assert_allclose(bulk, expected, rtol=1e-14)
-
-
-@pytest.mark.parametrize("keep", ["poisson", "bulk"])
-def test_without_damping_there_is_no_imaginary_part(keep):
-    real, imaginary = complex_constants(
-        MIXED, Moduli(SECANT.shear_modulus, np.zeros(3)), "shake91", keep
-    )
-    assert imaginary is None
-    np.testing.assert_array_equal(real.shear_modulus, SECANT.shear_modulus)
-
-
 # ---------------------------------------------------------------- the input and its lines
 
 
-def excitation(num_samples, lines, motions=2, dt=0.02) -> tuple[Excitation, np.ndarray]:
+def excitation(period, lines, motions=2, dt=0.02, **more) -> tuple[Excitation, np.ndarray]:
     """Lines with random weights, and random transfer functions of four rows."""
-    rng = np.random.default_rng(num_samples)
+    rng = np.random.default_rng(period)
 
     def noise(*shape):
         return rng.normal(size=shape) + 1j * rng.normal(size=shape)
 
     lines = np.asarray(lines)
     weights = noise(motions, len(lines))
-    whole = Excitation(lines, weights, tuple(range(motions)), num_samples, dt, len(lines))
+    whole = Excitation(lines, weights, tuple(range(motions)), period, dt, len(lines), **more)
     return whole, noise(4, motions, len(lines))
 
 
+@pytest.mark.parametrize("contour", [{}, {"eta": 3.0}, {"eta": 3.0, "num_samples": 2}])
 @pytest.mark.parametrize(
-    ("num_samples", "lines"),
+    ("period", "lines"),
     [
         (16, range(9)),  # with line 0 and Nyquist's
         (15, range(8)),  # an odd number has no Nyquist line
@@ -489,20 +446,23 @@ def excitation(num_samples, lines, motions=2, dt=0.02) -> tuple[Excitation, np.n
     ],
 )
 @pytest.mark.parametrize("derivative", [0, 1, 2])
-def test_weights_sum_the_response_at_any_sample(num_samples, lines, derivative):
-    given, h = excitation(num_samples, lines)
-    spectra = given.respond(h) * (1j * given.omega) ** derivative
+def test_factors_sum_the_response_at_any_sample(period, lines, derivative, contour):
+    given, h = excitation(period, lines, **contour)
+    spectra = np.einsum("rmk,mk->rk", h, given.weights) * given.s**derivative
     history = given.to_time(spectra)
-    assert history.shape == (4, num_samples)
-    scale = np.abs(spectra).sum() / num_samples
-    for sample in range(num_samples):
-        weights = given.weights_at(sample * given.dt) * (1j * given.omega) ** derivative
-        summed = np.einsum("rmk,mk->r", h, weights).real
+    assert history.shape == (4, contour.get("num_samples", period))
+    assert given.duration == pytest.approx(history.shape[1] * given.dt)
+    np.testing.assert_allclose(given.s, contour.get("eta", 0.0) + 1j * given.omega)
+    scale = np.abs(spectra).sum() / period
+    for sample in range(history.shape[1]):
+        factors = given.sum_at(sample * given.dt) * given.s**derivative
+        summed = np.einsum("rmk,mk->r", h, given.weights * factors).real
         np.testing.assert_allclose(summed, history[:, sample], atol=100 * EPS * scale)
-    # The period closes.
-    period = given.weights_at(num_samples * given.dt)
+    # The period closes, but for what the contour lets grow.
+    whole = given.sum_at(period * given.dt)
+    grown = np.exp(given.eta * period * given.dt)
     np.testing.assert_allclose(
-        period, given.weights_at(0.0), atol=1000 * EPS * np.abs(period).max()
+        whole, grown * given.sum_at(0.0), atol=1000 * EPS * np.abs(whole).max()
     )
 
 
@@ -514,11 +474,31 @@ def test_to_time_is_the_inverse_transform_with_zeros_elsewhere():
     np.testing.assert_allclose(given.frequency, np.array([0, 2, 5, 10]) / (20 * 0.02))
 
 
-def test_motions_add_up():
-    given, h = excitation(16, [1, 2, 3])
-    summed = sum(h[:, m] * given.weights[m] for m in range(2))
-    np.testing.assert_allclose(given.respond(h), summed, rtol=1e-14)
-    assert given.respond(h[None]).shape == (1, 4, 3)
+class Projected:
+    """A sweep of which projections alone are known."""
+
+    def __init__(self, h):
+        self.h = h
+
+    def project(self, _rows):
+        return self.h
+
+
+def test_motions_and_what_is_carried_add_up():
+    given, h = excitation(16, [1, 2, 3], motions=3)
+    summed = sum(h[:, m] * given.weights[m] for m in range(3))
+    carried = replace(given, axes=(0, 1))  # the third right-hand side is no motion
+    for excited, motions in ((given, 3), (carried, 2)):
+        response = Response(Projected(h), excited)
+        np.testing.assert_allclose(response.spectra(None).coefficients, summed, rtol=1e-14)
+        np.testing.assert_array_equal(response.transfer(None), h[:, :motions])
+        np.testing.assert_array_equal(excited.motion_weights, given.weights[:motions])
+    spectra = Spectra(summed, np.arange(16.0).reshape(4, 4))
+    square = spectra.reshape(2, 2)
+    assert square.coefficients.shape == (2, 2, 3) and square.start.shape == (2, 2, 4)
+    difference = (spectra - spectra[[1, 0, 3, 2]])[1:]
+    np.testing.assert_array_equal(difference.coefficients[0], summed[1] - summed[0])
+    np.testing.assert_array_equal(difference.start[:, 0], [4, -4, 4])
 
 
 def test_a_pure_harmonic_excites_one_line():
@@ -577,6 +557,14 @@ class FieldSweep:
         return out
 
 
+def hysteretic_shear(domain, modulus: complex) -> Material:
+    """A complex shear modulus, the same everywhere, with λ of nought."""
+    every = np.ones(domain.num_cells)
+    real = ElasticConstants(0 * every, modulus.real * every)
+    imaginary = ElasticConstants(0 * every, modulus.imag * every)
+    return Material(real, (Part("real", real, constant), Part("imaginary", imaginary, hysteretic)))
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("cell", ["quadrilateral", "tetrahedron"])
 def test_peaks_of_a_uniform_field(cell):
@@ -595,17 +583,17 @@ def test_peaks_of_a_uniform_field(cell):
     weights = np.array([[amplitude * N / 2]], complex)
     given = Excitation(np.array([line]), weights, (0,), N, dt, 1)
     probe = CellProbe(domain, T, "plane")
-    sweep = FieldSweep(fields)
-    modulus = np.full(domain.num_cells, 20e6 * (1 + 0.3j))
-    base = np.zeros((gdim, 1, 1), complex)
-    base[0] = 0.5 * shear  # as if the base were half a metre up
-    peaks = probe.peaks(sweep, given, modulus, base)
+    response = Response(FieldSweep(fields), given)
+    modulus = 20e6 * (1 + 0.3j)
+    base = np.zeros((gdim, 1), complex)
+    base[0] = 0.5 * shear * weights[0]  # as if the base were half a metre up
+    peaks = probe.peaks(response, hysteretic_shear(domain, modulus), Spectra(base))
     # Sampled sixteen times a cycle from known phases: the peak over the samples, not the crest.
     phase = 2 * np.pi * line * np.arange(N) / N
     peak = np.abs(amplitude * np.real(shear * np.exp(1j * phase))).max()
     np.testing.assert_allclose(peaks.strain, peak, rtol=1e-12)
-    np.testing.assert_allclose(probe.peak_strain(sweep, given), peak, rtol=1e-12)
-    stress = np.abs(amplitude * np.real(modulus[0] * shear * np.exp(1j * phase))).max()
+    np.testing.assert_allclose(probe.peak_strain(response), peak, rtol=1e-12)
+    stress = np.abs(amplitude * np.real(modulus * shear * np.exp(1j * phase))).max()
     np.testing.assert_allclose(peaks.stress, stress, rtol=1e-12)
     omega = 2 * np.pi * line / (N * dt)
     heights = domain.gather_cells(centroids(domain)[:, -1])
@@ -632,8 +620,8 @@ def test_at_rest_the_modulus_is_real():
     fields = (x @ np.array([[0, 1e-3], [0, 0]]).T).astype(complex).reshape(-1, 1, 1)
     given = Excitation(np.array([0]), np.array([[8.0 + 0j]]), (0,), 8, 0.1, 1)
     probe = CellProbe(domain, T, "plane")
-    modulus, base = np.array([1e6 * (1 + 0.5j)]), np.zeros((2, 1, 1), complex)
-    peaks = probe.peaks(FieldSweep(fields), given, modulus, base)
+    law, base = hysteretic_shear(domain, 1e6 * (1 + 0.5j)), Spectra(np.zeros((2, 1), complex))
+    peaks = probe.peaks(Response(FieldSweep(fields), given), law, base)
     assert peaks.stress[0] == pytest.approx(1e3, rel=1e-12)
     probe.destroy()
     T.destroy()

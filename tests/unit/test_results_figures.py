@@ -15,6 +15,7 @@ from fenics_hytf.results import open_result, read_result
 from fenics_hytf.results.figures import style
 from fenics_hytf.results.figures.convergence import convergence
 from fenics_hytf.results.figures.drawing import all_figures
+from fenics_hytf.results.figures.energy import energy_balance
 from fenics_hytf.results.figures.histories import base_motions, histories
 from fenics_hytf.results.figures.profiles import peak_profiles, profiles
 from fenics_hytf.results.figures.section import section
@@ -24,7 +25,8 @@ from fenics_hytf.results.figures.spectra import (
     response_spectra,
     transfer_functions,
 )
-from tests.unit.results_builder import make_result
+from fenics_hytf.results.figures.stiffness import stiffness
+from tests.unit.results_builder import DEGRADES, make_result
 
 
 def store(folder, result):
@@ -237,7 +239,7 @@ def test_maps_of_a_section_leave_the_air_out(tmp_path):
     lapse = result.lapses[0]
     x, y = lapse.cells.centroid.T
     ground = (y < 12.0) | (x < 16.0) | (x > 28.0)  # a trench, 12 m wide and deep
-    cells = {k: v[ground] for k, v in vars(lapse.cells).items()}
+    cells = {k: v[ground] for k, v in vars(lapse.cells).items() if v is not None}
     lapse = replace(lapse, cells=replace(lapse.cells, **cells))
     stored = store(tmp_path / "r", replace(result, lapses=(lapse,)))
     with style.figure_style():
@@ -291,6 +293,83 @@ def test_convergence_shows_every_iteration_and_the_tolerance(tmp_path):
     assert axes.lines[3].get_ydata()[0] == 1e-3
 
 
+@pytest.mark.parametrize("lapses", [1, 3, 40])
+def test_energy_adds_up_from_lapse_to_lapse(tmp_path, lapses):
+    law = {"complex_modulus": "maxwell"}
+    result = make_result(lapses=lapses, continuity="transient", solver=law)
+    stored = store(tmp_path / "r", result)
+    with style.figure_style():
+        figure = energy_balance(stored)
+    above = figure.axes[0]
+    assert len(figure.axes) == (1 if lapses == 1 else 2)
+    factor = 1e3 if "[kJ/m]" in above.get_ylabel() else 1.0
+    energies = [lapse.energy for lapse in result.lapses]
+    come = next(line for line in above.lines if line.get_label() == "input")
+    time, energy = come.get_data()
+    np.testing.assert_allclose(time, np.linspace(0.0, 12.0, lapses + 1), atol=1e-12)
+    np.testing.assert_allclose(factor * energy[1:], np.cumsum([e.input for e in energies]))
+    # the top of what is lost and stored is what came in, at the base and at seams
+    top = np.cumsum([e.damping for e in energies]) + [e.stored[1] for e in energies]
+    drawn = max(
+        path.vertices[:, 1].max() for part in above.collections for path in part.get_paths()
+    )
+    assert factor * drawn == pytest.approx(top.max(), rel=1e-12)
+    if lapses > 1:
+        both = next(line for line in above.lines if line.get_label() == "input and seams")
+        # each lapse is off by 1e-3
+        np.testing.assert_allclose(factor * both.get_ydata()[1:], top, atol=1.1e-3 * lapses)
+        marks = {line.get_label(): line for line in figure.axes[1].lines}
+        np.testing.assert_allclose(
+            factor * marks["jump at the seam"].get_ydata(), [e.seam for e in energies[1:]]
+        )
+        np.testing.assert_allclose(
+            factor * marks["from fading stress"].get_ydata(), [-e.rest for e in energies[1:]]
+        )
+
+
+def test_stiffness_is_a_step_a_lapse(tmp_path):
+    result = make_result(lapses=3, effects=DEGRADES)
+    stored = store(tmp_path / "r", result)
+    with style.figure_style():
+        above, below = stiffness(stored).axes
+    assert [line.get_label() for line in above.lines] == ["fill, 0–4 m", "sand, 4–24 m"]
+    softest = [[c.g_over_gmax[c.region == r].min() for c in (i.cells for i in result.lapses)]
+               for r in (1, 0)]  # fmt: skip
+    for line, values in zip(above.lines, softest, strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), [0.0, 4.0, 8.0, 12.0])
+        np.testing.assert_array_equal(line.get_ydata()[:-1], values)
+        assert line.get_drawstyle() == "steps-post"
+    np.testing.assert_array_equal(below.lines[0].get_ydata(), [1.0, 0.98, 0.98**2, 0.98**2])
+
+
+@pytest.mark.parametrize(
+    ("case", "panels"),
+    [
+        ({}, None),
+        ({"lapses": 3, "loop": False}, None),
+        ({"lapses": 3, "continuity": "steady"}, ["G/Gmax [-]"]),
+        (
+            {"lapses": 3, "loop": False, "effects": {"degradation": True}},
+            ["Degradation index [-]"],
+        ),
+    ],
+    ids=str,
+)
+def test_stiffness_is_drawn_where_it_changes(tmp_path, case, panels):
+    with style.figure_style():
+        figure = stiffness(store(tmp_path / "r", make_result(**case)))
+    assert (None if figure is None else [a.get_ylabel() for a in figure.axes]) == panels
+
+
+def test_transfer_functions_on_a_damped_contour_say_so(tmp_path):
+    stored = store(tmp_path / "r", make_result(lapses=3))
+    with style.figure_style():
+        drawn = [(f, d) for f, d in all_figures(stored) if d.file == "transfer_x.png"]
+    [(figure, drawing)] = drawn
+    assert "at s = η + iω" in figure.axes[0].get_ylabel()
+    assert "damped contour s = η + iω, η = 0.575 1/s" in drawing.caption
+
+
 def test_six_receivers_at_most_from_top_to_bottom(tmp_path):
     shown = shown_receivers(store(tmp_path / "r", make_result(receivers=9)))
     assert len(shown) == 6 and shown[0] == "r0" and shown[-1] == "r8"
@@ -311,7 +390,12 @@ def test_names_are_shown_as_they_are():
 
 @pytest.mark.parametrize(
     "case",
-    [{"compliant": True}, {"kind": "box", "loop": False}, {"kind": "box", "gdim": 3}],
+    [
+        {"compliant": True},
+        {"kind": "box", "loop": False},
+        {"kind": "box", "gdim": 3},
+        {"lapses": 3, "effects": DEGRADES},
+    ],
     ids=str,
 )
 def test_every_axis_has_its_unit(tmp_path, case):

@@ -14,7 +14,7 @@ from fenics_hytf.motion import intensity_measures
 from fenics_hytf.results import open_result, publish
 from fenics_hytf.results.report.conventions import method
 from fenics_hytf.results.summary import warnings
-from tests.unit.results_builder import ROCK, make_result
+from tests.unit.results_builder import DEGRADES, ROCK, make_result
 
 MOTION_X = ("histories_x", "transfer_x", "spectra_x", "fourier_x")
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -64,9 +64,13 @@ def text_of(result, folder):
         (
             {"directions": ("x", "z"), "gdim": 3, "kind": "box", "lapses": 3, "receivers": 9},
             {"histories_x", "histories_z", "transfer_x_x", "transfer_z_z", "convergence"}
-            | {"spectra_x", "spectra_z", "fourier_x", "fourier_z"},
+            | {"energy", "stiffness", "spectra_x", "spectra_z", "fourier_x", "fourier_z"},
         ),
         ({"receivers": 0, "loop": False}, set()),
+        (
+            {"lapses": 3, "solver": {"complex_modulus": "hysteretic"}},
+            {"stiffness", "convergence", *MOTION_X},
+        ),
     ],
     ids=str,
 )
@@ -147,6 +151,31 @@ def test_the_report_tells_a_within_motion_above_rock(tmp_path):
         ({"directions": ("z",), "kind": "box"}, "moves across its plane (SH waves)"),
         ({"output": {"water_table": 20.0}}, "below the water table at elevation 20 m"),
         ({"lapses": 3}, "cut into 3 lapses of 4 s"),
+        ({"lapses": 3, "continuity": "steady"}, "Each lapse is taken as periodic"),
+        ({"lapses": 3}, "memory of the soil at the end of one, carried by the material points"),
+        ({"lapses": 3}, "a spring beside four Maxwell branches"),
+        (
+            {"lapses": 3},
+            "modes 2 to 5 rise in frequency by 1–3 % at D = 2 %, 4–8 % at 5 % and 8–16",
+        ),
+        ({"lapses": 3}, "Above D = 0.25 four branches no longer hold the loss factor"),
+        ({"lapses": 3}, "Transfer functions are those on the contour"),
+        ({"lapses": 3}, "all 60 of them, up to 10 Hz, the Nyquist frequency, were solved in each"),
+        ({"lapses": 3, "compliant": True}, "The dashpots of the base are real, ρV"),
+        (
+            {"lapses": 3, "solver": {"complex_modulus": "maxwell", "reference_frequency": 2.5}},
+            "G at the reference frequency of 2.50 Hz",
+        ),
+        (
+            {"lapses": 3, "solver": {"complex_modulus": "hysteretic"}},
+            "in every lapse the response to the whole record is solved",
+        ),
+        ({"continuity": "transient"}, "The analysed 12 s begin at rest."),
+        ({"lapses": 3, "effects": DEGRADES}, "Cycles of shear strain counted in a lapse"),
+        (
+            {"lapses": 3, "loop": False, "effects": {"degradation": True}},
+            "but for what cycles leave of the modulus",
+        ),
         (
             {"effects": {"calm": {"sides": ["left"], "thickness": 5.0, "damping": 0.3}}},
             "Along left a layer 5 m thick absorbs waves: damping grows by up to 0.3",
@@ -158,6 +187,25 @@ def test_the_method_is_told_as_it_was(tmp_path, case, words):
     with open_result(tmp_path / "r") as folder:
         summary = folder.write(make_result(**case))
     assert words in " ".join(method(summary))
+
+
+def test_the_report_tells_seams_and_energy(tmp_path):
+    result = make_result(lapses=3, effects=DEGRADES)
+    text = text_of(result, tmp_path / "r")
+    assert "The seam error is estimated at 0.03 % or less" in text
+    assert "The worst is lapse 2." in text
+    energies = [lapse.energy for lapse in result.lapses]
+    come, lost = (sum(getattr(e, name) for e in energies) for name in ("input", "damping"))
+    assert f"{come:.0f} J/m came in at the base, {100 * lost / come:.2g} % of it was lost" in text
+    assert re.search(rf"2 8 3\.0e-04 {energies[2].input:.3g} ", text)
+    assert f"all {come:.0f} {lost:.0f} 10.0 — — 7.00 3.0e-03" in text
+    assert "Degradation fill: above a strain of 0.01 %" in text
+    assert "Degradation index [-]" in text and " 0.960 " in text
+
+
+@pytest.mark.parametrize("case", [{}, {"lapses": 3, "continuity": "steady"}], ids=str)
+def test_without_a_seam_or_energy_there_is_no_section_on_them(tmp_path, case):
+    assert "Seams and energy" not in text_of(make_result(**case), tmp_path / "r")
 
 
 def test_the_report_tells_layers_iterations_and_intensity(tmp_path):

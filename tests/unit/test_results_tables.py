@@ -20,7 +20,7 @@ from fenics_hytf.motion import (
 )
 from fenics_hytf.results import open_result, read_result, read_table
 from fenics_hytf.results.summary import plain
-from tests.unit.results_builder import make_result, make_snapshot
+from tests.unit.results_builder import DEGRADES, make_result, make_snapshot
 
 CASES = [
     {},
@@ -145,11 +145,13 @@ def test_a_base_without_rock_has_no_outcrop(tmp_path):
     assert told["outcrop_pga_g"] is None and told["outcrop_intensity"] is None
 
 
-def test_intensity_of_every_receiver(tmp_path):
-    result = make_result(directions=("x", "z"), gdim=3, kind="box", lapses=3)
+@pytest.mark.parametrize("continuity", ["steady", "transient"])
+def test_intensity_of_every_receiver(tmp_path, continuity):
+    result = make_result(("x", "z"), gdim=3, kind="box", lapses=3, continuity=continuity)
     summary = write(tmp_path / "r", result)
     history = result.history("total_acceleration")
-    seams = np.cumsum([0, *(lapse.num_samples for lapse in result.lapses[:-1])])
+    # transient lapses are one motion, steady ones are periods of their own
+    seams = [0, 80, 160] if continuity == "steady" else [0]
     for r, name in enumerate(result.receivers):
         for c, component in enumerate(result.components):
             told = summary["intensity"][name][component]
@@ -228,6 +230,86 @@ def test_cells_of_every_lapse(tmp_path):
     np.testing.assert_allclose(table["stress_ratio"][here], cells.peak_stress / stress, rtol=1e-13)
     names = np.array(result.region_names, dtype=object)[cells.region]
     np.testing.assert_array_equal(table["region"][here], names)
+
+
+def test_cells_that_degrade_have_a_column_more(tmp_path):
+    result = make_result(lapses=3, effects=DEGRADES)
+    summary = write(tmp_path / "r", result)
+    write(tmp_path / "s", make_result(lapses=3))
+    plain_header = header(tmp_path / "s/cells.csv")
+    assert header(tmp_path / "r/cells.csv") == [*plain_header, "degradation"]
+    table = read_table(tmp_path / "r/cells.csv")
+    for i, lapse in enumerate(result.lapses):
+        index = lapse.cells.degradation
+        np.testing.assert_array_equal(table["degradation"][table["lapse"] == i], index)
+        assert summary["lapses"][i]["degradation"] == index.min()
+        fill, sand = (layer["degradation"] for layer in summary["lapses"][i]["layers"])
+        assert fill == [index.min()] * 2 and sand == [1.0, 1.0]
+    assert summary["scene"]["degradation"]["threshold"] == 1e-4
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_energy_of_lapses_and_of_the_run(tmp_path, gdim):
+    result = make_result(lapses=4, kind="box", gdim=gdim)
+    summary = write(tmp_path / "r", result)
+    unit = "J/m" if gdim == 2 else "J"
+    for told, lapse in zip(summary["lapses"], result.lapses, strict=True):
+        energy = lapse.energy
+        assert told["seam_error"] == lapse.seam_error
+        assert told["energy"] == {
+            "unit": unit,
+            "input": energy.input,
+            "damping": energy.damping,
+            "rest": energy.rest,
+            "kinetic": list(energy.kinetic),
+            "strain": list(energy.strain),
+            "seam": energy.seam,
+            "imbalance": energy.imbalance,
+        }
+    run = summary["energy"]
+    assert run["unit"] == unit
+    assert summary["worst_seam_error"] == max(i.seam_error for i in result.lapses[1:])
+    come = sum(lapse.energy.input for lapse in result.lapses)
+    assert run["input"] == come
+    # a lapse is off by 1e-3; round-off of sums of some 1e3
+    assert run["worst_imbalance"] == pytest.approx(1e-3 / come, rel=1e-8)
+    left = run["input"] - run["damping"] - run["rest"] + run["seam"] - run["imbalance"]
+    assert left == pytest.approx(run["stored"][1] - run["stored"][0], abs=1e-10)
+    assert summary["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    "case", [{"continuity": "steady"}, {"solver": {"complex_modulus": "hysteretic"}}], ids=str
+)
+def test_without_a_causal_law_there_is_no_energy(tmp_path, case):
+    summary = write(tmp_path / "r", make_result(lapses=3, **case))
+    assert summary["energy"] is None and summary["lapses"][1]["energy"] is None
+    assert (summary["worst_seam_error"] is None) == ("continuity" in case)
+    assert summary["scene"]["scheme"] == ("steady" if "continuity" in case else "whole_record")
+
+
+def test_what_was_solved_is_told(tmp_path):
+    told = write(tmp_path / "r", make_result(lapses=3))["scene"]
+    assert told["continuity"] == "transient" and told["scheme"] == "handover"
+    assert told["solver"]["complex_modulus"] == "maxwell"
+    assert told["solver"]["reference_frequency"] > 0
+    # six lapses of 80 samples of 0.05 s, over which e^(ηt) grows by e^13.8
+    assert told["contour"]["period_s"] == pytest.approx(24.0, rel=1e-15)
+    assert told["contour"]["eta_1_s"] == pytest.approx(13.8 / 24.0, rel=1e-15)
+    told = write(tmp_path / "s", make_result())["scene"]
+    assert told["scheme"] == "steady" and told["contour"] is None
+
+
+def test_warnings_of_seams_energy_and_the_law(tmp_path):
+    result = make_result(lapses=3)
+    first, lapse, last = result.lapses
+    energy = replace(lapse.energy, damping=lapse.energy.damping + 100.0)
+    cells = replace(lapse.cells, damping=np.full_like(lapse.cells.damping, 0.3))
+    lapse = replace(lapse, seam_error=0.05, energy=energy, cells=cells)
+    found = write(tmp_path / "r", replace(result, lapses=(first, lapse, last)))["warnings"]
+    assert len(found) == 3
+    assert "seam between lapses by 5 %" in found[0] and "off balance by" in found[1]
+    assert "30 %" in found[2] and "Maxwell" in found[2]
 
 
 @pytest.mark.parametrize("case", [{}, {"directions": ("z",), "kind": "box"}], ids=str)

@@ -184,6 +184,11 @@ def test_the_scene_itself_is_good():
         ({"lapses": {"duration": 1e308}}, "lapses.duration", "1e+308", ""),
         ({"lapses__count": 0}, "lapses.count", "0", "from 1"),
         ({"solver__max_frequency": 2.6}, "solver.max_frequency", "2.6", "at most 2.5 Hz"),
+        ({"lapses__continuity": "cyclic"}, "lapses.continuity", '"cyclic"', '"transient"'),
+        ({"solver__complex_modulus": "kelvin"}, "solver.complex_modulus", '"kelvin"', '"maxwell"'),
+        ({"solver__reference_frequency": 0}, "solver.reference_frequency", "0", "[Hz]"),
+        ({"solver__complex_modulus": "kramer", "solver__reference_frequency": 2.0},
+         "solver.reference_frequency", "2.0", 'nothing without complex_modulus = "maxwell"'),
         # effects
         ({"effects__equivalent_linear": {"magnitude": 7, "strain_ratio": 1}},
          "effects.equivalent_linear", "strain_ratio and magnitude", "at most one"),
@@ -224,12 +229,9 @@ def test_receiver_names_that_are_no_column(name):
     ("values", "key"),
     [
         ({"mesh__empty": ["air"]}, "mesh.empty"),
-        ({"lapses__continuity": "transient"}, "lapses.continuity"),
-        ({"solver__complex_modulus": "maxwell"}, "solver.complex_modulus"),
-        ({"solver__reference_frequency": 2.0}, "solver.reference_frequency"),
         *(
             ({f"effects__{name}": value}, f"effects.{name}")
-            for name in ("gravity", "sliding", "softening", "degradation", "locking", "k0")
+            for name in ("gravity", "sliding", "softening", "locking", "k0")
             for value in (True, {"a": 1})
         ),
     ],

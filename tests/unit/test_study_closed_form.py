@@ -124,6 +124,8 @@ def test_damping_of_curves_where_a_soil_has_no_own():
         ({"boundary": TIED | {"top": "roller"}}, "top is roller"),
         ({"boundary": {"left": "roller", "right": "roller"}}, "side 'left' is roller"),
         ({"effects": {"rayleigh": {"alpha": 0.1}}}, "rayleigh"),
+        ({"lapses": {"continuity": "transient"}}, "transient, not periodic"),
+        ({"solver": {"complex_modulus": "maxwell"}}, "maxwell"),
     ],
 )
 def test_what_it_does_not_describe(sections, why):

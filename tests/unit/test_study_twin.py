@@ -90,7 +90,7 @@ def test_what_the_twin_is():
     case = column(
         soil=soil,
         effects={"equivalent_linear": True, "rayleigh": {"alpha": 0.2, "beta": 1e-4}},
-        lapses={"count": 3},
+        lapses={"count": 3, "continuity": "steady"},
         solver={"max_frequency": 10.0, "sweep": "reduced", "tolerance": 1e-5},
     )
     before = copy.deepcopy(case.data)
@@ -105,6 +105,16 @@ def test_what_the_twin_is():
     plain = viscous_twin(column())
     given = np.subtract(rayleigh(twin), rayleigh(plain))
     assert given == pytest.approx([0.2, 1e-4], rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", [{}, {"reference_frequency": 3.0}, {"keep": "bulk"}])
+def test_the_twin_of_several_transient_lapses(solver):
+    """Their law hangs on frequency, the twin's damping on the damping ratio alone."""
+    case = column(lapses={"count": 3}, solver=solver)
+    assert case.solver.complex_modulus == "maxwell"
+    twin, plain = viscous_twin(case), viscous_twin(column(solver={"keep": case.solver.keep}))
+    assert (len(twin.segments), twin.lapses.continuity) == (1, "steady")
+    assert rayleigh(twin) == rayleigh(plain)
 
 
 def test_the_record_is_padded_until_rest(figure):

@@ -16,7 +16,7 @@ from support.reference import DATA
 
 from fenics_hytf.domain import build, constraint_matrix
 from fenics_hytf.frequency import DynamicSystem, direct_sweep
-from fenics_hytf.lapse import Equations, Moduli, complex_constants, seed_points, survey
+from fenics_hytf.lapse import Equations, Moduli, material, seed_points, survey
 from fenics_hytf.operators import DashpotForm, ElasticForm, assemble_mass
 from fenics_hytf.particles import particle_mass_matrix, transfer_matrix
 from fenics_hytf.scene import Scene
@@ -63,8 +63,7 @@ def respond(scene: Scene, frequency: float, loads: list) -> tuple[np.ndarray, np
         equations.weigh(points)
         ground = survey(scene, domain, points)
         moduli = Moduli(ground.shear_modulus, ground.damping)
-        parts = complex_constants(ground, moduli, "hysteretic", "poisson")
-        system = equations.assemble(ground, *parts).system
+        system = equations.assemble(ground, material(ground, moduli, scene.solver)).system
     traction = DashpotForm(domain, ["left"])
     on_left = traction.create_matrix()
     cells = np.ones(len(domain.regions))

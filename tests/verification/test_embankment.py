@@ -15,7 +15,7 @@ from support.meshes import gmsh_model, mesh_script
 from support.reference import comb, load
 
 from fenics_hytf.domain import build
-from fenics_hytf.lapse import Equations, complex_constants, seed_points, survey
+from fenics_hytf.lapse import Equations, material, seed_points, survey
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import simulate
 
@@ -109,8 +109,7 @@ def test_natural_frequencies(case, tmp_path, figure):
     equations.weigh(points)
     ground = survey(scene, domain, points)
     moduli = ground.secant(np.zeros(domain.num_cells))
-    parts = complex_constants(ground, moduli, scene.solver.complex_modulus, scene.solver.keep)
-    system = equations.assemble(ground, *parts).system
+    system = equations.assemble(ground, material(ground, moduli, scene.solver)).system
     stiffness = system.create_matrix()
     system.fill(stiffness, 0.0)
     K, M = real(stiffness), real(system.mass)

@@ -6,7 +6,8 @@ from mpi4py import MPI
 
 from fenics_hytf.particles import PointsOutside
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation import SimulationError, flow, simulate
+from fenics_hytf.simulation import SimulationError, simulate
+from fenics_hytf.simulation import run as steps
 
 
 def scene(**changes):
@@ -17,7 +18,7 @@ def scene(**changes):
         "soil": {"sand": soil},
         "motion": [{"direction": "x", "synthetic": {"n": 256}, "pga": 0.1}],
         "boundary": {"left": "tied", "right": "tied"},
-        "lapses": {"count": 4},
+        "lapses": {"count": 4, "continuity": "steady"},
         "solver": {"max_frequency": 5.0},
         "output": {"receivers": {"top": [0.5, 4.0], "rider": {"point": [0.5, 3.0]}}},
     }
@@ -25,10 +26,19 @@ def scene(**changes):
 
 
 @pytest.mark.mpi
-def test_fewer_cells_than_ranks():
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"lapses": {"count": 4}, "solver": {}},
+        {"lapses": {"count": 4}, "solver": {"complex_modulus": "hysteretic"}},
+    ],
+    ids=["steady", "handed over", "whole record"],
+)
+def test_fewer_cells_than_ranks(changes):
     # Two cells on three ranks: one rank holds nothing, and takes part all the same.
-    parallel = simulate(scene())
-    serial = simulate(scene(), MPI.COMM_SELF)
+    parallel = simulate(scene(**changes))
+    serial = simulate(scene(**changes), MPI.COMM_SELF)
     for name in ("displacement", "total_acceleration"):
         expected = serial.history(name)
         difference = np.abs(parallel.history(name) - expected).max()
@@ -37,7 +47,7 @@ def test_fewer_cells_than_ranks():
 
 def test_an_error_names_its_lapse_and_keeps_the_lapses_before(monkeypatch):
     calls = []
-    original = flow.convect
+    original = steps.convect
 
     def fail_in_the_third(*arguments):
         calls.append(arguments)
@@ -45,7 +55,7 @@ def test_an_error_names_its_lapse_and_keeps_the_lapses_before(monkeypatch):
             raise PointsOutside("point 7 left")
         return original(*arguments)
 
-    monkeypatch.setattr(flow, "convect", fail_in_the_third)
+    monkeypatch.setattr(steps, "convect", fail_in_the_third)
     with pytest.raises(SimulationError, match="lapse 2: point 7 left") as caught:
         simulate(scene(effects={"convection": True}))
     assert caught.value.lapse == 2
@@ -72,14 +82,14 @@ def test_an_undamped_resonance_is_named():
 
 
 def test_a_rider_whose_point_has_left_is_not_a_number(monkeypatch):
-    original = flow.convect
+    original = steps.convect
 
     def carry_off(domain, points, increment, *arguments):
         increment = increment.copy()
         increment[:, 1] += 1.5  # what lies in the upper 1.5 m leaves through the top
         return original(domain, points, increment, *arguments)
 
-    monkeypatch.setattr(flow, "convect", carry_off)
+    monkeypatch.setattr(steps, "convect", carry_off)
     place = {"receivers": {"rider": {"point": [0.5, 3.5]}}}
     settings = {"effects": {"convection": True}, "points": {"outside": "park"}, "output": place}
     with pytest.raises(SimulationError, match="without material points") as caught:

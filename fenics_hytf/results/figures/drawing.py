@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from fenics_hytf.results.figures import style
 from fenics_hytf.results.figures.convergence import convergence
+from fenics_hytf.results.figures.energy import energy_balance
 from fenics_hytf.results.figures.histories import base_motions, histories
 from fenics_hytf.results.figures.profiles import caption, peak_profiles, profiles
 from fenics_hytf.results.figures.section import section
@@ -18,6 +19,7 @@ from fenics_hytf.results.figures.shown import (
     has_transfer,
     input_kind,
     left_out,
+    on_contour,
     seams,
     shown_components,
     solved_band,
@@ -27,6 +29,7 @@ from fenics_hytf.results.figures.spectra import (
     response_spectra,
     transfer_functions,
 )
+from fenics_hytf.results.figures.stiffness import stiffness, stiffness_caption
 from fenics_hytf.results.reader import StoredResult
 
 
@@ -38,7 +41,8 @@ class Drawing:
         file: Its name in the result folder.
         title: Heading.
         caption: What it shows, and how to read it.
-        part: Where it belongs in the report: ``base``, ``motion``, ``ground`` or ``loop``.
+        part: Where it belongs in the report: ``base``, ``motion``, ``ground``, ``seams`` or
+            ``loop``.
     """
 
     file: str
@@ -90,6 +94,8 @@ def all_figures(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
         for component in components:
             yield _fourier(stored, component, band)
     yield from _ground(stored)
+    if stored.summary["energy"] is not None:
+        yield _energy(stored)
     if any(lapse["change"] for lapse in stored.summary["lapses"]):
         text = (
             "Largest change over all cells of the shear modulus or of the damping ratio from one "
@@ -138,7 +144,7 @@ def _transfer(stored: StoredResult, component: str, direction: str) -> tuple[Fig
     kind = input_kind(stored, direction)
     text = (
         f"Amplitude of total acceleration over the input as given ({kind}), on the lines that were "
-        f"solved.{_which_lapse(stored)}{left_out(stored)}"
+        f"solved{on_contour(stored)}.{_which_lapse(stored)}{left_out(stored)}"
     )
     name = f"transfer_{component}{'_' + direction if several else ''}.png"
     title = f"Transfer function, {component} over input {direction}"
@@ -172,6 +178,24 @@ def _ground(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
         if len(stored.summary["lapses"]) > 1:
             text += " Over all lapses: the largest, of G/Gmax the smallest."
         yield maps, Drawing("section.png", "Section", text, "ground")
+    softened = stiffness(stored)
+    if softened is not None:
+        text = stiffness_caption(stored)
+        yield softened, Drawing("stiffness.png", "Stiffness from lapse to lapse", text, "ground")
+
+
+def _energy(stored: StoredResult) -> tuple[Figure, Drawing]:
+    text = (
+        "Input is the work of the base's acceleration on the mass that moves relative to it. "
+        "Summed up to the end of each lapse, straight in between."
+    )
+    if len(stored.summary["lapses"]) > 1:
+        text += (
+            " Where moduli change at a seam the energy in the springs jumps, and stress that the "
+            "new moduli do not account for does work while it fades: input and these make what is "
+            "lost and stored. Below: both, lapse by lapse, and what does not close."
+        )
+    return energy_balance(stored), Drawing("energy.png", "Energy", text, "seams")
 
 
 def _seams(stored: StoredResult) -> str:

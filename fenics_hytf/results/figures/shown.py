@@ -81,3 +81,14 @@ def left_out(stored: StoredResult) -> str:
     """Words for a caption where not all receivers are shown."""
     count = len(stored.summary["receivers"])
     return f" {MAX_LINES} of {count} receivers are shown." if count > MAX_LINES else ""
+
+
+def on_contour(stored: StoredResult) -> str:
+    """Words for a caption where lines lie on a damped contour."""
+    contour = stored.summary["scene"]["contour"]
+    if contour is None:
+        return ""
+    return (
+        f", which lie on the damped contour s = η + iω, η = {contour['eta_1_s']:.3g} 1/s: peaks "
+        "are lower and wider than those of a steady motion"
+    )

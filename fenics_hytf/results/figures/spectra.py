@@ -28,7 +28,10 @@ _BAND = (0.1, 25.0)  # [Hz]: what engineers look at of a record
 
 
 def transfer_functions(stored: StoredResult, component: str, direction: str) -> Figure:
-    """Amplitude |A/input| of every shown receiver over frequency, logarithmic in frequency."""
+    """Amplitude |A/input| of every shown receiver over frequency, logarithmic in frequency.
+
+    On a damped contour s = η + iω frequency is ω/2π.
+    """
     figure = Figure(figsize=(9.0, 4.2))
     axes = figure.subplots()
     last = stored.summary["lapses"][-1]["index"]
@@ -51,7 +54,8 @@ def transfer_functions(stored: StoredResult, component: str, direction: str) -> 
         axes.axhline(1.0, color=QUIET, linewidth=0.8, zorder=1)
     _frequency_axis(axes, ends)
     kind = input_kind(stored, direction)
-    axes.set_ylabel(f"|A$_{component}$ / {kind} input$_{direction}$| [-]")
+    where = "" if stored.summary["scene"]["contour"] is None else ", at s = η + iω"
+    axes.set_ylabel(f"|A$_{component}$ / {kind} input$_{direction}$|{where} [-]")
     legend(axes)
     return figure
 

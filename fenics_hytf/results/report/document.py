@@ -25,6 +25,7 @@ from fenics_hytf.results.report.findings import (
 )
 from fenics_hytf.results.report.input import input_section
 from fenics_hytf.results.report.markup import number, paragraphs, section, text
+from fenics_hytf.results.report.seams import seams_section
 from fenics_hytf.results.report.style import STYLE
 from fenics_hytf.results.report.work import work_section
 from fenics_hytf.results.summary import component_peaks
@@ -56,7 +57,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
     title = summary["title"] or "Ground response"
     figures = {
         part: "\n".join(_figure(stored, drawing) for drawing in drawings if drawing.part == part)
-        for part in ("base", "motion", "ground", "loop")
+        for part in ("base", "motion", "ground", "seams", "loop")
     }
     body = [
         f"<header><h1>{escape(title)}</h1>{_byline(summary)}</header>",
@@ -72,6 +73,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
             figures["motion"],
         ),
         section("Strain, stress and stiffness", figures["ground"]),
+        seams_section(summary, figures["seams"]),
         _convergence(stored, figures["loop"]),
         work_section(summary),
     ]

@@ -113,6 +113,7 @@ def layers_table(summary: Summary) -> str:
     chosen = [lapses[int(i)] for i in np.linspace(0, len(lapses) - 1, count).round()]
     column = any("depth_m" in layer for lapse in lapses for layer in lapse["layers"])
     several = len(lapses) > 1
+    degrades = any(layer["degradation"] is not None for i in lapses for layer in i["layers"])
     rows = [
         (
             *((lapse["index"] if i == 0 else "",) if several else ()),
@@ -121,6 +122,7 @@ def layers_table(summary: Summary) -> str:
             layer["cells"],
             span(layer["effective_strain"], 100.0),
             span(layer["g_over_gmax"]),
+            *((span(layer["degradation"]),) if degrades else ()),
             span(layer["damping"], 100.0),
             power(layer["change"]),
             {True: "yes", False: "NO", None: NOTHING}[layer["converged"]],
@@ -135,6 +137,7 @@ def layers_table(summary: Summary) -> str:
         "Cells [-]",
         "Effective strain [%]",
         "G/Gmax [-]",
+        *(("Degradation index [-]",) if degrades else ()),
         "Damping [%]",
         "Final change [-]",
         "Converged",

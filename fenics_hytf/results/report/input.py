@@ -114,7 +114,7 @@ def _settings(summary: Summary) -> list[tuple[str, str]]:
         ("Effects", effects),
         ("Mesh", scene["mesh"]["text"]),
         ("Boundaries", ", ".join(f"{name} {kind.replace('_', ' ')}" for name, kind in kinds)),
-        ("Complex modulus", f"{solver['complex_modulus']}, {_kept(solver['keep'])} kept"),
+        ("Complex modulus", _modulus(solver)),
         (
             "Sweep",
             f"{solver['sweep']}, tolerance {solver['tolerance']:g}, "
@@ -126,10 +126,24 @@ def _settings(summary: Summary) -> list[tuple[str, str]]:
     if scene["loop_tolerance"] is not None:
         text = f"strain ratio {scene['strain_ratio']:g}, tolerance {scene['loop_tolerance']:g}"
         settings.insert(1, ("Equivalent linear", text))
+    degradation = scene["degradation"]
+    if degradation is not None:
+        soils = ", ".join(degradation["soils"] or ["all soils"])
+        text = (
+            f"{soils}: above a strain of {100 * degradation['threshold']:g} %, "
+            f"s {degradation['s']:g}, r {degradation['r']:g}, not below {degradation['minimum']:g}"
+        )
+        settings.insert(1, ("Degradation", text))
     if scene["rayleigh"] is not None:
         text = f"alpha {scene['rayleigh']['alpha']:g} 1/s, beta {scene['rayleigh']['beta']:g} s"
         settings.insert(1, ("Rayleigh damping", text))
     return settings
+
+
+def _modulus(solver: Mapping[str, Any]) -> str:
+    text = f"{solver['complex_modulus']}, {_kept(solver['keep'])} kept"
+    frequency = solver["reference_frequency"]
+    return text if frequency is None else f"{text}, G at {number(frequency)} Hz"
 
 
 def _kept(name: str) -> str:
