@@ -3,6 +3,7 @@
 
 from fenics_hytf.lapse.base import BaseProbe, outcrop_motion, within_motion
 from fenics_hytf.lapse.cells import CarriedCells, CellPeaks, CellProbe
+from fenics_hytf.lapse.choice import choose_continuity
 from fenics_hytf.lapse.continuity import Continuity, Steady, excite
 from fenics_hytf.lapse.convective import cell_stress, convect
 from fenics_hytf.lapse.cycles import CycleCount
@@ -24,7 +25,7 @@ from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
 from fenics_hytf.lapse.run import Observer, Solved, solve
-from fenics_hytf.lapse.schemes import choose_continuity
+from fenics_hytf.lapse.scheme import Scheme, scheme_of
 from fenics_hytf.lapse.whole_record import WholeRecord
 
 __all__ = [
@@ -57,6 +58,7 @@ __all__ = [
     "Part",
     "ReceiverProbe",
     "Response",
+    "Scheme",
     "Solved",
     "Spectra",
     "Steady",
@@ -73,6 +75,7 @@ __all__ = [
     "outcrop_motion",
     "peak_length",
     "peak_shear_strain",
+    "scheme_of",
     "seed_points",
     "solve",
     "survey",

@@ -29,6 +29,7 @@ from scipy.spatial import KDTree
 
 from fenics_hytf.domain import Domain, side_column
 from fenics_hytf.lapse.cells import CellProbe
+from fenics_hytf.lapse.choice import choose_continuity
 from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.equivalent_linear import first_strain
 from fenics_hytf.lapse.excitation import Excitation
@@ -37,7 +38,6 @@ from fenics_hytf.lapse.handover import FADING, fading
 from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.run import Observer, Solved, solve
-from fenics_hytf.lapse.schemes import choose_continuity
 from fenics_hytf.motion import Segment
 from fenics_hytf.operators import (
     DashpotForm,

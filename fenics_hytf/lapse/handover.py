@@ -20,7 +20,6 @@ Elastic and viscous ground is the case without branches.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,9 +36,9 @@ from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.motion import (
-    Contour,
     LapseRecord,
     Segment,
     StartFunctions,
@@ -63,10 +62,6 @@ ComplexArray = npt.NDArray[np.complex128]
 FADING = 0.5
 """τ_q, with which a rest of stress fades after the moduli have changed [s]."""
 
-# T_p over the lapse, and ηT_p. With 4 and 9.2 forty lapses of an elastic column were 1.3e-3 off in
-# displacement, of a lightly damped one 8e-4; with these, 4e-5 and 9e-6. ηT is the same, 2.3.
-_TIMES, _DECAY = 6, 13.8
-
 
 class Handover:
     """Hands displacement, velocity, stress and memory from lapse to lapse.
@@ -75,22 +70,21 @@ class Handover:
         scene: The scene.
         domain: The domain.
         equations: Its equations.
+        scheme: Its contour, and what points carry.
     """
 
     goes_on_from_nought = True
 
-    def __init__(self, scene: Scene, domain: Domain, equations: Equations) -> None:
+    def __init__(self, scene: Scene, domain: Domain, equations: Equations, scheme: Scheme) -> None:
         self._scene, self._domain, self._equations = scene, domain, equations
         motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
         self._record = LapseRecord(motion, scene.dt)
-        length = scene.segments[0].num_samples
-        self._contour = Contour.over(length, scene.dt, _TIMES, _DECAY)
+        assert scheme.contour is not None
+        self._contour = scheme.contour
         rates = (*(1 / tau for tau in RELAXATION_TIMES), 1 / FADING)
         limit = scene.solver.max_frequency
         self._start = StartFunctions.fading_in(self._contour, limit, rates)
-        self._remembers = scene.solver.complex_modulus == "maxwell" and material_damps(
-            scene, domain
-        )
+        self.fields = scheme.carried(domain.num_components)
         self._force = InternalForce(domain)
         self._centres = cell_centres(domain.mesh, 0, domain.num_owned_cells)
         self._excitation: Excitation
@@ -99,21 +93,6 @@ class Handover:
         self._at_centres: _State
         self._momentum: PETSc.Vec | None = None
         self._solved: LapseEquations
-
-    @property
-    def fields(self) -> Mapping[str, tuple[int, ...]]:
-        """What the points carry; strain and stress are Voigt columns, shear strain as γ = 2ε."""
-        count = self._domain.num_components
-        strains = {1: 2, 2: 3, 3: 6}[count]
-        fields: dict[str, tuple[int, ...]] = {
-            "dynamic_velocity": (count,),
-            "dynamic_displacement": (count,),
-            "dynamic_strain": (strains,),
-            "dynamic_stress": (strains,),
-        }
-        if self._remembers:
-            fields["memory_strain"] = (len(RELAXATION_TIMES), strains)
-        return fields
 
     def excite(self, segment: Segment) -> Excitation:
         """Every line of the contour up to the maximum frequency."""
@@ -261,7 +240,7 @@ class Handover:
     def energy(
         self, response: Response, material: Material, stored_before: float | None
     ) -> Energy | None:
-        """What came in, was lost and is stored; not beside a free field, which does work as well."""
+        """What came in, was lost and is stored; not beside a free field, whose work is not known."""
         law, sides = self._scene.solver.complex_modulus, self._scene.supports.values()
         causal = law == "maxwell" or len(material.parts) == 1
         if not causal or "free_field" in sides:
@@ -353,7 +332,7 @@ class Handover:
         points["dynamic_velocity"] = S @ at_end(derivative=1)
         strain = points["dynamic_strain"]
         points["dynamic_strain"] = strain + (B @ increment.ravel()).reshape(strain.shape)
-        if self._remembers:
+        if "memory_strain" in self.fields:
             memory = points["memory_strain"]
             for branch, tau in enumerate(RELAXATION_TIMES):
                 remembered = (B @ at_end(relaxation_time=tau).ravel()).reshape(strain.shape)
@@ -424,11 +403,3 @@ def _half_of_normal(stress: RealArray) -> RealArray:
         measure[:, :normal] -= stress[:, :normal].mean(axis=1, keepdims=True)
         measure[:, :normal] /= 2
     return measure
-
-
-def material_damps(scene: Scene, domain: Domain) -> bool:
-    """Whether a soil or an absorbing layer has damping."""
-    loop = scene.effects.equivalent_linear is not None
-    soils = [scene.soil[name] for name in domain.region_names]
-    damped = any((loop and soil.curve is not None) or soil.damping_ratio(loop) for soil in soils)
-    return damped or scene.effects.calm is not None

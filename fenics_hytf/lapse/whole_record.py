@@ -14,7 +14,6 @@ the record.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,9 +27,9 @@ from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.motion import (
-    Contour,
     LapseRecord,
     Segment,
     StartFunctions,
@@ -42,8 +41,6 @@ from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
 
-_TIMES, _DECAY = 4, 9.2  # T_p over the record, and ηT_p
-
 
 class WholeRecord:
     """The response to the whole record and a free vibration about it.
@@ -52,29 +49,27 @@ class WholeRecord:
         scene: The scene.
         domain: The domain.
         equations: Its equations.
+        scheme: Its contour, and what points carry.
     """
 
     goes_on_from_nought = False
 
-    def __init__(self, scene: Scene, domain: Domain, equations: Equations) -> None:
+    def __init__(self, scene: Scene, domain: Domain, equations: Equations, scheme: Scheme) -> None:
         self._scene, self._domain, self._equations = scene, domain, equations
         motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
         record = LapseRecord(motion, scene.dt)
         self._motion = motion
-        self._contour = Contour.over(motion.shape[1], scene.dt, _TIMES, _DECAY)
+        assert scheme.contour is not None
+        self._contour = scheme.contour
+        self.fields = scheme.carried(domain.num_components)
         self._transform = self._contour.transform(motion, record.derivatives[:, :, 0].T)
         # A free vibration is as long as a lapse.
         length = scene.segments[0].num_samples
-        lapse = Contour.over(length, scene.dt, _TIMES, _DECAY)
+        share = length / motion.shape[1]
+        lapse = replace(self._contour, period=round(share * self._contour.period))
         self._start = StartFunctions.fading_in(lapse, scene.solver.max_frequency)
         self._excitation: Excitation
         self._points: Points
-
-    @property
-    def fields(self) -> Mapping[str, tuple[int, ...]]:
-        """Displacement and velocity."""
-        shape = (self._domain.num_components,)
-        return {"dynamic_velocity": shape, "dynamic_displacement": shape}
 
     def excite(self, segment: Segment) -> Excitation:
         """All lines of the record, read from the start of the lapse on."""
@@ -121,7 +116,7 @@ class WholeRecord:
         return Response(JoinedSweep(record, free), given, start, start_factorisations=1)
 
     def _momentum_beside(self, driven: Response, derivative: int) -> PETSc.Vec:
-        """Momentum SᵀM_p of what the points' displacement or velocity differs from the driven one by."""
+        """SᵀM_p times displacement or velocity of the points less the driven one."""
         points, S = self._points, transfer_matrix(self._points, self._domain.V)
         carried = points["dynamic_velocity" if derivative else "dynamic_displacement"]
         nodal = self._equations.expand(driven.unknowns_at(0.0, derivative))
@@ -130,7 +125,7 @@ class WholeRecord:
         )
 
     def _starts(self, equations: LapseEquations, w: PETSc.Vec, rate: PETSc.Vec) -> Columns:
-        """c of the start functions of the free vibration, from its two momenta."""
+        """Coefficients of the start functions of the free vibration, from its two momenta."""
         viscous = [(C, -1.0) for C in equations.viscous]
         stiff = [(K, -share) for K, share in equations.stiff]
         displacement, velocity = self._equations.accelerate(w), self._equations.accelerate(rate)

@@ -35,11 +35,11 @@ def describe_scene(scene: Scene, region_names: tuple[str, ...]) -> dict[str, Any
 
     Returns:
         Plain values. ``scheme`` says how lapses hang together, see
-        :class:`fenics_hytf.simulation.Scheme`; ``contour`` is the damped contour on which they are
+        :class:`fenics_hytf.lapse.Scheme`; ``contour`` is the damped contour on which they are
         solved, or ``None``.
     """
     # what solves is loaded where something was solved, not where a result is read
-    from fenics_hytf.simulation.scheme import scheme_of
+    from fenics_hytf.lapse import scheme_of
 
     scheme = scheme_of(scene, region_names)
     contour = scheme.contour

@@ -17,7 +17,6 @@ from fenics_hytf.simulation.records import (
     SnapshotCallback,
     Work,
 )
-from fenics_hytf.simulation.scheme import Scheme, scheme_of
 
 __all__ = [
     "Checkpoint",
@@ -27,7 +26,6 @@ __all__ = [
     "Progress",
     "ProgressCallback",
     "Result",
-    "Scheme",
     "SimulationError",
     "Snapshot",
     "SnapshotCallback",
@@ -36,6 +34,5 @@ __all__ = [
     "inspect",
     "mesh_faults",
     "peak_memory",
-    "scheme_of",
     "simulate",
 ]

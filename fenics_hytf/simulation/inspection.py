@@ -10,10 +10,9 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_hytf.domain import constraint_matrix
-from fenics_hytf.lapse import excite, seed_points
+from fenics_hytf.lapse import Scheme, excite, scheme_of, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
-from fenics_hytf.simulation.scheme import Scheme, scheme_of
 from fenics_hytf.soil import HELD_DAMPING, RELAXATION_TIMES
 
 # Entries of an LDLᵀ factor a row, from nested dissection: 2D c n log2 n (measured 7.6 M entries on

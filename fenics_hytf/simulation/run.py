@@ -43,6 +43,7 @@ from fenics_hytf.particles import (
     MassLedger,
     gather_points,
     scatter_points,
+    transfer_matrix,
 )
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
@@ -107,6 +108,8 @@ class Run:
         # Displacement at the start of a lapse: of the receivers relative to the base, of the base.
         self._carried: RealArray
         self._base_carried: RealArray
+        self._base_before: RealArray
+        self._start_field: RealArray | float = 0.0
         self._owned: list[Equations | CellProbe | BaseProbe | FreeField] = []
 
     def set_up(self) -> None:
@@ -214,6 +217,7 @@ class Run:
             if self.continuity.goes_on_from_nought:
                 at_end = self._base.at(response.unknowns_at(excitation.duration))
                 self._carried += moved - at_end
+                self._base_before = self._base_carried.copy()
                 self._base_carried += at_end
         self.lapses.append(
             LapseResult(
@@ -294,9 +298,22 @@ class Run:
     def hand_over(self, solved: Solved) -> None:
         """Points take what goes on in the next lapse."""
         with self.clock.phase("convection"):
+            if self.scene.output.fields:
+                self._start_field = self._displacement_at_start()
             self.continuity.finish(self.points, solved.response, solved.material)
             for column in self.free_fields:
                 column.finish()
+
+    def _displacement_at_start(self) -> RealArray | float:
+        """What a field of the lapse is added to [m]: of the nodes, relative to the base."""
+        if not self.continuity.goes_on_from_nought:
+            return 0.0
+        S = transfer_matrix(self.points, self.domain.V)
+        carried = self.points["dynamic_displacement"] - self._base_before
+        momentum = self.equations.collect((S.T @ (self.points.mass[:, None] * carried)).ravel())
+        field = self.equations.expand(self.equations.accelerate(momentum))
+        momentum.destroy()
+        return field
 
     def convect(self, solved: Solved) -> None:
         """Points take u(t_end) − u(t_start), move, and are found again by (7)-(9)."""
@@ -335,7 +352,7 @@ class Run:
                     self.scene,
                     self.domain,
                     self.points,
-                    lambda time: self._nodal_motion(solved, time),
+                    lambda time: self._start_field + self._nodal_motion(solved, time),
                     solved.moduli,
                     self.lapses[-1],
                     time,

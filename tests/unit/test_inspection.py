@@ -14,7 +14,8 @@ from fenics_hytf.cli.check import describe
 from fenics_hytf.lapse import Equations, choose_continuity, seed_points
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import inspect, scheme_of, simulate
+from fenics_hytf.lapse import scheme_of
+from fenics_hytf.simulation import inspect, simulate
 from fenics_hytf.simulation.check import checked_domain
 
 SAND = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "damping": 0.05}

@@ -218,7 +218,7 @@ def test_mesh_file_in_space(shared_path, figure):
 @pytest.mark.parametrize(
     ("count", "continuity", "law"),
     # What differs grows from lapse to lapse where they are short and handed over.
-    [(4, "steady", "hysteretic"), (3, "transient", "maxwell"), (2, "transient", "hysteretic")],
+    [(4, "steady", "hysteretic"), (4, "transient", "maxwell"), (4, "transient", "hysteretic")],
 )
 def test_lapses_with_convection(count, continuity, law, figure):
     """Every effect but degradation at once, over several lapses."""
