@@ -247,10 +247,13 @@ def direct_sweep(
         with together(across), SymmetricFactorisation(system) as factorisation:
             for done, line in enumerate(mine, start=1):
                 factorisation.factorise(complex(lines[line]))
-                for side, right in enumerate(sides(line) if callable(sides) else sides):
+                rights = sides(line) if callable(sides) else sides
+                for side, right in enumerate(rights):
                     column.placeArray(values[:, line * len(sides) + side])
                     residuals[line, side] = factorisation.solve(right, column, tolerance)
                     column.resetArray()
+                    if callable(sides):  # made for this line
+                        right.destroy()
                 if progress is not None:
                     progress(min(done * across.size, len(lines)), len(lines))
             count = factorisation.factorisations

@@ -28,7 +28,7 @@ class Loads(Protocol):
         """How many a line has."""
 
     def __call__(self, line: int) -> Sequence[PETSc.Vec]:
-        """Return those of a line by its number, borrowed until the next call."""
+        """Make those of a line by its number; the caller destroys them."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class AffineLoads:
         return int(self.coefficients.shape[1])
 
     def __call__(self, line: int) -> Sequence[PETSc.Vec]:
-        """Those of a line, made anew."""
+        """Make those of a line; see :class:`Loads`."""
         sides = []
         for side in range(len(self)):
             total = self.vectors[0].duplicate()
@@ -154,6 +154,7 @@ def _gathered(
                 W = np.column_stack([W, rest / left])
                 c = np.append(c, left)
             found[-1].append(c)
+            load.destroy()
     if not W.shape[1]:  # loads of nought, or no line: one vector of nought holds them
         W = np.zeros((num_local, 1), np.complex128)
     coordinates = np.zeros((W.shape[1], len(loads), num_lines), np.complex128)

@@ -51,7 +51,7 @@ class BaseProbe:
             response: The response.
 
         Returns:
-            ``num_components`` of them; nought where the base is held.
+            A spectrum for each component; nought where the base is held.
         """
         if self._rows is None:
             shape = (self._domain.num_components, len(response.excitation.lines))
@@ -61,7 +61,14 @@ class BaseProbe:
         return Spectra(np.asarray(comm.allreduce(mine.coefficients)), start)
 
     def at(self, unknowns: RealArray) -> RealArray:
-        """The same of unknowns at one instant, shape ``(num_components,)``."""
+        """Mean displacement of the base at one instant (collective).
+
+        Args:
+            unknowns: This rank's unknowns then [m], shape ``(num_local_unknowns,)``.
+
+        Returns:
+            [m], shape ``(num_components,)``.
+        """
         if self._rows is None:
             return np.zeros(self._domain.num_components)
         x, mean = self._rows.createVecs()
@@ -104,7 +111,7 @@ def outcrop_motion(
 
     Returns:
         On the solved lines [m/s^2], shape ``(num_motions, num_samples)``; ``None`` where the
-        scene does not tell the rock, or the traction.
+        scene does not tell the rock, or the traction, as of a within motion on a damped contour.
     """
     rock, given = scene.boundary.rock, response.excitation
     if rock is None:

@@ -94,6 +94,9 @@ class Continuity(Protocol):
     def finish(self, points: Points, response: Response, material: Material) -> None:
         """Leave on the points what the lapse ends with, before they move (collective)."""
 
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+
 
 class Steady:
     """Each lapse its own periodic steady state.
@@ -136,6 +139,9 @@ class Steady:
 
     def finish(self, points: Points, response: Response, material: Material) -> None:
         """Nothing is left."""
+
+    def destroy(self) -> None:
+        """There are none."""
 
 
 def excite(

@@ -17,6 +17,7 @@ from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.cells import CarriedCells, CellProbe
 from fenics_hytf.lapse.peaks import peak_shear_strain
 from fenics_hytf.lapse.response import Response
+from fenics_hytf.operators import NORMAL_STRAINS
 from fenics_hytf.scene import Degradation
 from fenics_hytf.soil import CyclicState
 
@@ -91,7 +92,7 @@ def signed_shear(strain: RealArray) -> RealArray:
         component is positive, so that it does not change from lapse to lapse.
     """
     deviator = strain.copy()
-    normal = {2: 0, 3: 2, 6: 3}[strain.shape[1]]
+    normal = NORMAL_STRAINS[strain.shape[1]]
     deviator[:, normal:] /= np.sqrt(2.0)  # ε:ε counts a shear component twice, γ²/2
     if normal:
         deviator[:, :normal] -= strain[:, :normal].mean(axis=1, keepdims=True)

@@ -26,7 +26,7 @@ from fenics_hytf.lapse.response import Response
 
 RealArray = npt.NDArray[np.float64]
 
-_SPLINE = 5
+_SPLINE = 5  # degree through the power, for its integral
 
 
 @dataclass(frozen=True)
@@ -95,9 +95,7 @@ class Course:
             Shape ``(num_directions, num_samples + 1)``.
         """
         given = self._given
-        factor = given.s**derivative
-        if relaxation_time is not None:
-            factor = factor * given.s * relaxation_time / (1 + given.s * relaxation_time)
+        factor = given.factors(derivative, relaxation_time)
         y = self._y * factor
         x = given.to_time(y)
         if self._complex:  # Re(Vz) of the analytic signal z, whose imaginary part is Re(−iz)

@@ -75,7 +75,8 @@ class LapseEquations:
         system: A(s) of the lapse.
         loads: −TᵀM r of each motion [kg, in 2D kg/m], with what comes from beyond the sides.
         viscous: What is multiplied by the velocity: C and the dashpots of a base.
-        stiff: What is multiplied by the displacement, and how much of it against a jump.
+        stiff: What is multiplied by the displacement, parts of the law first and in their order,
+            and the share of each that a sudden displacement meets.
     """
 
     system: DynamicSystem
@@ -298,6 +299,7 @@ class Equations:
 
     def share_at_reference(self, part: Part) -> float:
         """Real part of a function of s where the modulus is G; nought for hysteretic damping."""
+        # Hysteretic laws name no frequency: theirs are the same at all.
         frequency = self._scene.solver.reference_frequency or 1.0
         return float(np.real(part.function(2j * np.pi * frequency)))
 
@@ -402,13 +404,12 @@ def rock_factors(scene: Scene) -> tuple[complex, complex]:
     assert rock is not None
     if solver.complex_modulus == "maxwell":
         return 1.0, 1.0
-    assert solver.complex_modulus is not None
     return wave_factors(rock.damping, rock.poisson, solver.complex_modulus, solver.keep)
 
 
 @dataclass(frozen=True)
 class _SideLoads:
-    """Right-hand sides with what comes from beyond the sides."""
+    """Right-hand sides with what comes from beyond the sides; made anew for each line."""
 
     equations: Equations
     loads: list[PETSc.Vec] | AffineLoads

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.motion import StartFunctions, to_time
+from fenics_hytf.motion import Contour, Segment, StartFunctions, to_time
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -55,6 +55,55 @@ class Excitation:
         """A lapse is as long as the period where nothing else is said."""
         if not self.num_samples:
             object.__setattr__(self, "num_samples", self.period)
+
+    @classmethod
+    def on_contour(
+        cls,
+        contour: Contour,
+        max_frequency: float | None,
+        weights: ComplexArray,
+        axes: tuple[int, ...],
+        segment: Segment,
+        motion: RealArray,
+        start: StartFunctions,
+    ) -> Excitation:
+        """The input of a lapse on a damped contour.
+
+        Args:
+            contour: The contour.
+            max_frequency: Of the lines that are solved [Hz]; the Nyquist frequency if ``None``.
+            weights: Of the motions on all lines of the contour, shape
+                ``(num_motions, period//2 + 1)``.
+            axes: Component in which each motion acts.
+            segment: The lapse; something is carried into all but the first.
+            motion: Base acceleration of the whole record [m/s^2], shape
+                ``(num_motions, num_record_samples)``.
+            start: Functions that hold the start of the response.
+
+        Returns:
+            The input.
+        """
+        lines = contour.lines(max_frequency)
+        weights = weights[:, lines]
+        if segment.index:  # the transform of what is carried is over dt as well
+            weights = np.concatenate([weights, np.full((1, len(lines)), 1 / contour.dt)])
+        return cls(
+            lines,
+            weights,
+            axes,
+            contour.period,
+            contour.dt,
+            excited=len(lines),
+            num_samples=segment.num_samples,
+            eta=contour.eta,
+            given=motion[:, segment.samples],
+            start=start,
+        )
+
+    @property
+    def carries(self) -> bool:
+        """Whether what is carried over from the lapse before is one more side."""
+        return len(self.weights) > len(self.axes)
 
     @property
     def duration(self) -> float:
@@ -113,6 +162,21 @@ class Excitation:
         values = to_time(spectrum, self.period)[..., : self.num_samples]
         return values if self._growth is None else values * self._growth.astype(values.dtype)
 
+    def factors(self, derivative: int = 0, relaxation_time: float | None = None) -> ComplexArray:
+        """What a derivative or a memory multiplies the lines by: s^n, κ = sτ/(1 + sτ).
+
+        Args:
+            derivative: n.
+            relaxation_time: τ of a Maxwell branch that the lines go through, or ``None``.
+
+        Returns:
+            Shape ``(num_lines,)``.
+        """
+        factor = self.s**derivative
+        if relaxation_time is None:
+            return factor
+        return factor * self.s * relaxation_time / (1 + self.s * relaxation_time)
+
     def sum_at(self, time: float) -> ComplexArray:
         """Factors of the lines in the sum at one instant.
 
@@ -152,9 +216,9 @@ class Excitation:
         assert self.start is not None
         instant = np.array([time])
         if relaxation_time is None:
-            exact, factor = self.start.at(instant, derivative), self.s**derivative
+            exact = self.start.at(instant, derivative)
         else:
             exact = self.start.remembered(relaxation_time, instant)
-            factor = self.s * relaxation_time / (1 + self.s * relaxation_time)
-        lines = self.start_transform @ (factor * self.sum_at(time))
+        factors = self.factors(derivative, relaxation_time)
+        lines = self.start_transform @ (factors * self.sum_at(time))
         return np.asarray(exact[:, 0] - lines.real)

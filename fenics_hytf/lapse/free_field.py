@@ -28,13 +28,13 @@ from petsc4py import PETSc
 from scipy.spatial import KDTree
 
 from fenics_hytf.domain import Domain, side_column
+from fenics_hytf.lapse.carried import FADING, fading
 from fenics_hytf.lapse.cells import CellProbe
 from fenics_hytf.lapse.choice import choose_continuity
 from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.equivalent_linear import first_strain
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.ground import seed_points, survey
-from fenics_hytf.lapse.handover import FADING, fading
 from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.run import Observer, Solved, solve
@@ -127,7 +127,8 @@ class FreeField:
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        for owned in (self._equations, self._probe, self._rows, self._C, *self._P.values()):
+        held = (self._equations, self._continuity, self._probe, self._rows, self._C)
+        for owned in (*held, *self._P.values()):
             owned.destroy()
         self._forget()
 
@@ -251,6 +252,7 @@ class FreeField:
         if not self._continuity.goes_on_from_nought:
             return
         end = response.excitation.duration
+        # Of what was carried the rest alone, which is last, is not made of strain.
         left = [force.array_r.real * np.exp(-end / FADING) for _, force in self._carried[-1:]]
         self._moved = self._moved + response.unknowns_at(end)
         for branch, tau in enumerate(RELAXATION_TIMES):

@@ -20,15 +20,13 @@ Elastic and viscous ground is the case without branches.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
-from scipy import sparse
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import AffineLoads, Columns
+from fenics_hytf.lapse.carried import FADING, State, fading, half_of_normal, stress_of
 from fenics_hytf.lapse.cells import CarriedCells
 from fenics_hytf.lapse.continuity import Solve
 from fenics_hytf.lapse.energy import Course, Energy
@@ -43,7 +41,6 @@ from fenics_hytf.motion import (
     Segment,
     StartFunctions,
     band_limited,
-    frequencies,
 )
 from fenics_hytf.operators import InternalForce, isotropic_stress, strain_rows
 from fenics_hytf.particles import (
@@ -58,9 +55,6 @@ from fenics_hytf.soil import RELAXATION_TIMES
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
-
-FADING = 0.5
-"""τ_q, with which a rest of stress fades after the moduli have changed [s]."""
 
 
 class Handover:
@@ -89,30 +83,21 @@ class Handover:
         self._centres = cell_centres(domain.mesh, 0, domain.num_owned_cells)
         self._excitation: Excitation
         self._segment: Segment
-        self._at_gauss: _State
-        self._at_centres: _State
+        self._at_gauss: State
+        self._at_centres: State
         self._momentum: PETSc.Vec | None = None
         self._solved: LapseEquations
 
     def excite(self, segment: Segment) -> Excitation:
         """Every line of the contour up to the maximum frequency."""
         self._segment = segment
-        limit, contour = self._scene.solver.max_frequency, self._contour
-        frequency = frequencies(contour.period, contour.dt)
-        lines = np.flatnonzero(frequency <= (limit or np.inf) * (1 + 1e-12))
-        weights = self._record.weights(contour, segment.start, segment.num_samples)[:, lines]
-        if segment.index:  # the transform of what is carried is over dt as well
-            weights = np.concatenate([weights, np.full((1, len(lines)), 1 / contour.dt)])
-        return Excitation(
-            lines,
-            weights,
+        return Excitation.on_contour(
+            self._contour,
+            self._scene.solver.max_frequency,
+            self._record.weights(self._contour, segment.start, segment.num_samples),
             self._equations.axes,
-            contour.period,
-            contour.dt,
-            len(lines),
-            segment.num_samples,
-            contour.eta,
-            self._record.samples[:, segment.samples],
+            segment,
+            self._record.samples,
             self._start,
         )
 
@@ -120,11 +105,10 @@ class Handover:
         """Read what the points carry, at the Gauss points and in the middle of cells."""
         self._excitation = excitation
         mesh, degree = self._domain.mesh, self._domain.V.ufl_element().degree
-        self._at_gauss = _State.of(points, resample_matrix(mesh, points, degree, self._force.sites))
-        self._at_centres = _State.of(points, resample_matrix(mesh, points, degree, self._centres))
+        self._at_gauss = State.of(points, resample_matrix(mesh, points, degree, self._force.sites))
+        self._at_centres = State.of(points, resample_matrix(mesh, points, degree, self._centres))
         S = transfer_matrix(points, self._domain.V)
-        if self._momentum is not None:
-            self._momentum.destroy()
+        self.destroy()
         momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
         self._momentum = self._equations.collect(momentum.ravel())
 
@@ -132,7 +116,7 @@ class Handover:
         """The increment of the lapse, and its start."""
         self._solved = equations
         forces = self._forces(material)
-        if len(self._excitation.weights) > len(self._excitation.axes):
+        if self._excitation.carries:
             sweep = solve(self._equations.with_sides(self._loads(material, forces)))
         else:
             sweep = solve(equations.loads)
@@ -219,12 +203,12 @@ class Handover:
             strain, constants = state.strain_of(part), part.constants.at(cells)
             shares.append(constants[1][:, None] * strain)
             rest -= isotropic_stress(strain, *constants)
-        shares.append(_half_of_normal(rest))
+        shares.append(half_of_normal(rest))
         time = self._excitation.dt * np.arange(self._excitation.num_samples)
         taus = [*(part.relaxation_time for part in material.parts), FADING]
-        fading = [np.exp(-time / tau) if tau else np.ones_like(time) for tau in taus]
+        courses = [np.exp(-time / tau) if tau else np.ones_like(time) for tau in taus]
         return CarriedCells(
-            state.strain, state.displacement, np.stack(shares, axis=2), np.stack(fading)
+            state.strain, state.displacement, np.stack(shares, axis=2), np.stack(courses)
         )
 
     def jump(self, points: Points, response: Response) -> tuple[float, float] | None:
@@ -240,13 +224,13 @@ class Handover:
     def energy(
         self, response: Response, material: Material, stored_before: float | None
     ) -> Energy | None:
-        """What came in, was lost and is stored; not beside a free field, whose work is not known."""
+        """What came in, was lost and is stored; not known beside a free field, which does work."""
         law, sides = self._scene.solver.complex_modulus, self._scene.supports.values()
         causal = law == "maxwell" or len(material.parts) == 1
         if not causal or "free_field" in sides:
             return None
         course, segment = Course(response, self._domain.comm), self._segment
-        v, fade = course.coordinates(1), course.time / FADING
+        v = course.coordinates(1)
         count = segment.num_samples + 1
         motion = self._record.samples[:, segment.start : segment.start + count]
         motion = np.pad(motion, ((0, 0), (0, count - motion.shape[1])))
@@ -256,6 +240,7 @@ class Handover:
         for C in self._solved.viscous:
             lost += course.quadratic(C, v)
         *forces, rest = self._forces(material)
+        # Matrices of the parts come first among the stiff ones, K_NL after them.
         parts = zip(material.parts, forces, self._solved.stiff, strict=False)
         for part, force, (matrix, _) in parts:
             tau = part.relaxation_time
@@ -263,10 +248,8 @@ class Handover:
                 z, left = course.coordinates(relaxation_time=tau), np.exp(-course.time / tau)
                 held = 2 * self._elastic_energy(self._at_gauss, material, only=part)
                 cross = course.linear(force, z)
-                lost = (
-                    lost + (course.quadratic(matrix, z) + 2 * left * cross + left**2 * held) / tau
-                )
-        released = np.exp(-fade) * course.linear(rest, v)
+                lost += (course.quadratic(matrix, z) + 2 * left * cross + left**2 * held) / tau
+        released = np.exp(-course.time / FADING) * course.linear(rest, v)
         kinetic = 0.5 * course.quadratic(self._solved.system.mass, v)[[0, -1]]
         for force in (*forces, rest):
             force.destroy()
@@ -284,7 +267,7 @@ class Handover:
             0.0 if stored_before is None else stored - stored_before,
         )
 
-    def _at_end(self, response: Response) -> _State:
+    def _at_end(self, response: Response) -> State:
         """Strain and memory at the Gauss points at the end of the lapse."""
         end, state = response.excitation.duration, self._at_gauss
 
@@ -301,9 +284,9 @@ class Handover:
                 ],
                 axis=1,
             )
-        return _State(state.displacement, state.strain + added(), state.stress, memory)
+        return State(state.displacement, state.strain + added(), state.stress, memory)
 
-    def _elastic_energy(self, state: _State, material: Material, only: Part | None = None) -> float:
+    def _elastic_energy(self, state: State, material: Material, only: Part | None = None) -> float:
         """½ ∫ strain:D:strain of the parts of a law, or of one of them (collective)."""
         cells = self._domain.input_cells[self._force.sites.cell]
         total = 0.0
@@ -325,7 +308,7 @@ class Handover:
         B = strain_rows(gradient_matrices(points, V), self._domain.num_components)
         cells = self._domain.input_cells[points.cell]
         # What is left of the rest of stress that the lapse began with.
-        stress = points["dynamic_stress"] - _stress(_State.of(points), material, cells)
+        stress = points["dynamic_stress"] - stress_of(State.of(points), material, cells)
         stress *= np.exp(-end / FADING)
         increment = at_end()
         points["dynamic_displacement"] = points["dynamic_displacement"] + S @ increment
@@ -337,69 +320,9 @@ class Handover:
             for branch, tau in enumerate(RELAXATION_TIMES):
                 remembered = (B @ at_end(relaxation_time=tau).ravel()).reshape(strain.shape)
                 memory[:, branch] = memory[:, branch] * np.exp(-end / tau) + remembered
-        points["dynamic_stress"] = stress + _stress(_State.of(points), material, cells)
+        points["dynamic_stress"] = stress + stress_of(State.of(points), material, cells)
 
-
-@dataclass(frozen=True)
-class _State:
-    """What points carry, at the points themselves or elsewhere.
-
-    Attributes:
-        displacement: Shape ``(n, num_components)``.
-        strain: γ, shape ``(n, num_strains)``.
-        stress: σ, same shape.
-        memory: ζ, shape ``(n, 4, num_strains)``, or ``None`` where nothing is remembered.
-    """
-
-    displacement: RealArray
-    strain: RealArray
-    stress: RealArray
-    memory: RealArray | None
-
-    @classmethod
-    def of(cls, points: Points, R: sparse.csr_matrix | None = None) -> _State:
-        """That of the points, or what a resampling matrix makes of it."""
-
-        def read(name: str) -> RealArray:
-            values = points[name]
-            if R is None:
-                return values
-            flat = values.reshape(len(values), -1)
-            return np.asarray(R @ flat).reshape(R.shape[0], *values.shape[1:])
-
-        return cls(
-            read("dynamic_displacement"),
-            read("dynamic_strain"),
-            read("dynamic_stress"),
-            read("memory_strain") if "memory_strain" in points.history else None,
-        )
-
-    def strain_of(self, part: Part) -> RealArray:
-        """The strain that a part of the law acts on."""
-        if part.relaxation_time is None:
-            return self.strain
-        assert self.memory is not None
-        return self.memory[:, RELAXATION_TIMES.index(part.relaxation_time)]
-
-
-def _stress(state: _State, material: Material, cells: npt.NDArray[np.int64]) -> RealArray:
-    """Σ_j D_j of the strains that the parts act on."""
-    total = np.zeros_like(state.strain)
-    for part in material.parts:
-        total += isotropic_stress(state.strain_of(part), *part.constants.at(cells))
-    return total
-
-
-def fading(relaxation_time: float | None, s: ComplexArray) -> ComplexArray:
-    """Transform of e^{−t/τ}, or of 1."""
-    return 1 / s if relaxation_time is None else relaxation_time / (1 + s * relaxation_time)
-
-
-def _half_of_normal(stress: RealArray) -> RealArray:
-    """Stress in the measure of G times Voigt strain: half the normal deviator, and shear."""
-    normal = {2: 0, 3: 2, 6: 3}[stress.shape[1]]
-    measure = stress.copy()
-    if normal:
-        measure[:, :normal] -= stress[:, :normal].mean(axis=1, keepdims=True)
-        measure[:, :normal] /= 2
-    return measure
+    def destroy(self) -> None:
+        """Destroy the momentum that the lapse began with."""
+        if self._momentum is not None:
+            self._momentum.destroy()

@@ -31,6 +31,9 @@ from fenics_hytf.soil import (
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
+_MOST_DAMPING = 0.95  # of a Maxwell law, at the rim of an absorbing layer
+_JUMP = 1e12  # s far above every rate 1/τ [1/s]
+
 
 @dataclass(frozen=True)
 class ElasticConstants:
@@ -63,7 +66,7 @@ class Part:
     @property
     def instantaneous(self) -> float:
         """Share of the part in the stiffness against a jump, f(s → ∞) on the real axis."""
-        return float(np.real(self.function(complex(1e12))))
+        return float(np.real(self.function(complex(_JUMP))))
 
 
 @dataclass(frozen=True)
@@ -151,6 +154,3 @@ def _maxwell(ground: Ground, moduli: Moduli, solver: Solver) -> Material:
             constants = ElasticConstants(lame, share)
             parts.append(Part(f"branch {number}", constants, branches[number], tau))
     return Material(real, tuple(parts))
-
-
-_MOST_DAMPING = 0.95  # at the rim of an absorbing layer

@@ -161,17 +161,11 @@ class Response:
             This rank's, shape ``(num_local_unknowns,)``.
         """
         given = self.excitation
-        factor = given.sum_at(time) * given.s**derivative
-        if relaxation_time is not None:
-            factor = factor * given.s * relaxation_time / (1 + given.s * relaxation_time)
+        factor = given.sum_at(time) * given.factors(derivative, relaxation_time)
         values = self.sweep.combine(given.weights * factor).real
         if self.start is not None:
-            values = (
-                values
-                + (
-                    self.start @ given.start_at(time, derivative, relaxation_time).astype(complex)
-                ).real
-            )
+            functions = given.start_at(time, derivative, relaxation_time)
+            values = values + (self.start @ functions.astype(complex)).real
         return np.asarray(values)
 
 
@@ -218,7 +212,8 @@ class ReceiverProbe:
 
         Args:
             response: The response.
-            base: Of the base, which relative motion is relative to, ``num_components`` of them.
+            base: Motion of the base, which relative motion is relative to, a spectrum for each
+                component.
 
         Returns:
             The histories; the displacement is the increment of the lapse.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Which way the lapses of a scene hang together, told from the scene alone.
+"""Which way the lapses of a scene hang together, told from it and the soils of its mesh.
 
 ``steady``, the paper's; a hand-over where the law is causal, as without material damping, or where
 one lapse hands nothing over; else the whole record in every lapse.
@@ -11,9 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from fenics_hytf.motion import Contour, frequencies
+from fenics_hytf.motion import Contour
 from fenics_hytf.scene import Scene
 from fenics_hytf.soil import RELAXATION_TIMES
 
@@ -43,8 +41,7 @@ class Scheme:
         """Lines of a lapse on the contour up to a frequency [Hz]; up to Nyquist's if ``None``."""
         if self.contour is None:
             raise ValueError("found steady continuity; expected one on a damped contour")
-        frequency = frequencies(self.contour.period, self.contour.dt)
-        return int(np.count_nonzero(frequency <= (max_frequency or np.inf) * (1 + 1e-12)))
+        return len(self.contour.lines(max_frequency))
 
     def carried(self, components: int) -> dict[str, tuple[int, ...]]:
         """What points carry: shapes of one point's entry by name.

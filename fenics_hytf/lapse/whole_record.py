@@ -34,7 +34,6 @@ from fenics_hytf.motion import (
     Segment,
     StartFunctions,
     band_limited,
-    frequencies,
 )
 from fenics_hytf.particles import Points, transfer_matrix
 from fenics_hytf.scene import Scene
@@ -73,23 +72,14 @@ class WholeRecord:
 
     def excite(self, segment: Segment) -> Excitation:
         """All lines of the record, read from the start of the lapse on."""
-        limit, contour = self._scene.solver.max_frequency, self._contour
-        frequency = frequencies(contour.period, contour.dt)
-        lines = np.flatnonzero(frequency <= (limit or np.inf) * (1 + 1e-12))
-        later = np.exp(contour.s[lines] * segment.start * contour.dt)
-        weights = self._transform[:, lines] * later
-        if segment.index:
-            weights = np.concatenate([weights, np.full((1, len(lines)), 1 / contour.dt)])
-        return Excitation(
-            lines,
-            weights,
+        later = np.exp(self._contour.s * segment.start * self._contour.dt)
+        return Excitation.on_contour(
+            self._contour,
+            self._scene.solver.max_frequency,
+            self._transform * later,
             self._equations.axes,
-            contour.period,
-            contour.dt,
-            len(lines),
-            segment.num_samples,
-            contour.eta,
-            self._motion[:, segment.samples],
+            segment,
+            self._motion,
             self._start,
         )
 
@@ -102,7 +92,7 @@ class WholeRecord:
         given = self._excitation
         record = solve(equations.loads)
         driven = Response(record, replace(given, weights=given.motion_weights, start=None))
-        if len(given.weights) == len(given.axes):
+        if not given.carries:
             return driven
         w, rate = (self._momentum_beside(driven, derivative) for derivative in (0, 1))
         displacement = self._equations.accelerate(w)
@@ -146,7 +136,7 @@ class WholeRecord:
 
     def jump(self, points: Points, response: Response) -> tuple[float, float] | None:
         """Displacement and velocity at the start of the lapse, against what was carried."""
-        if len(self._excitation.weights) == len(self._excitation.axes):
+        if not self._excitation.carries:
             return None
         S, comm = transfer_matrix(points, self._domain.V), self._domain.comm
         u, v = (S @ self._equations.expand(response.unknowns_at(0.0, order)) for order in (0, 1))
@@ -164,3 +154,6 @@ class WholeRecord:
         S, end = transfer_matrix(points, self._domain.V), response.excitation.duration
         for name, derivative in (("dynamic_displacement", 0), ("dynamic_velocity", 1)):
             points[name] = S @ self._equations.expand(response.unknowns_at(end, derivative))
+
+    def destroy(self) -> None:
+        """None outlives a call."""

@@ -1,16 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Ground motion: records, lapses, transforms, spectra and intensity. Knows no mesh and no MPI."""
 
-from fenics_hytf.motion.contour import (
-    Contour,
-    LapseRecord,
-    StartFunctions,
-    band_limited,
-    dominant_frequency,
-    energy_band,
-)
+from fenics_hytf.motion.contour import Contour, LapseRecord, StartFunctions
 from fenics_hytf.motion.formats import read, read_at2, read_csv
-from fenics_hytf.motion.fourier import fourier_amplitude, smoothed
+from fenics_hytf.motion.fourier import dominant_frequency, fourier_amplitude, smoothed
 from fenics_hytf.motion.intensity import (
     Intensity,
     arias_intensity,
@@ -23,7 +16,14 @@ from fenics_hytf.motion.lapses import Segment, split
 from fenics_hytf.motion.records import GRAVITY, Record, RecordError
 from fenics_hytf.motion.response import default_periods, response_spectrum
 from fenics_hytf.motion.sources import harmonic, recorded, recorded_names, synthetic
-from fenics_hytf.motion.spectra import excited_lines, frequencies, to_frequency, to_time
+from fenics_hytf.motion.spectra import (
+    band_limited,
+    energy_band,
+    excited_lines,
+    frequencies,
+    to_frequency,
+    to_time,
+)
 from fenics_hytf.motion.writers import write_at2, write_columns, write_csv
 
 __all__ = [

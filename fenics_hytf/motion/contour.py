@@ -21,8 +21,7 @@ import numpy.typing as npt
 from scipy import fft
 from scipy.interpolate import make_interp_spline
 
-from fenics_hytf.motion.fourier import smoothed
-from fenics_hytf.motion.spectra import frequencies
+from fenics_hytf.motion.spectra import above, frequencies
 
 RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
@@ -69,6 +68,10 @@ class Contour:
     def s(self) -> ComplexArray:
         """Complex frequencies up to the Nyquist frequency [rad/s], shape ``(period//2 + 1,)``."""
         return np.asarray(self.eta + 2j * np.pi * frequencies(self.period, self.dt))
+
+    def lines(self, max_frequency: float | None) -> npt.NDArray[np.intp]:
+        """Numbers of the lines up to a frequency [Hz]; of all if ``None``."""
+        return np.flatnonzero(~above(frequencies(self.period, self.dt), max_frequency))
 
     def growth(self, num_samples: int) -> RealArray:
         """e^{ηt} of the first samples, shape ``(num_samples,)``."""
@@ -245,61 +248,3 @@ class LapseRecord:
         piece = self.samples[:, start : start + len(shape)]
         piece = piece * shape[: piece.shape[1]]
         return contour.transform(piece, self.derivatives[:, :, start].T)
-
-
-def band_limited(samples: RealArray, dt: float, max_frequency: float | None) -> RealArray:
-    """A record without what lies above a frequency.
-
-    Args:
-        samples: Shape ``(num_motions, num_samples)``.
-        dt: Time step [s].
-        max_frequency: [Hz]; ``None`` leaves the record as it is.
-
-    Returns:
-        In the record's unit, same shape.
-    """
-    if max_frequency is None or max_frequency >= 0.5 / dt:
-        return samples
-    count = samples.shape[-1]
-    period = fft.next_fast_len(2 * count, real=True)  # nothing wraps round
-    spectrum = fft.rfft(samples, period, axis=-1)
-    spectrum[..., frequencies(period, dt) > max_frequency * (1.0 + 1e-12)] = 0.0
-    return np.asarray(fft.irfft(spectrum, period, axis=-1)[..., :count])
-
-
-def energy_band(samples: RealArray, dt: float, share: float = 0.99) -> float:
-    """Frequency below which lies a share of a record's energy.
-
-    Args:
-        samples: Shape ``(num_motions, num_samples)``.
-        dt: Time step [s].
-        share: [-].
-
-    Returns:
-        [Hz]; of several motions the highest; nought for motions that are zero.
-    """
-    spectrum = np.cumsum(np.abs(fft.rfft(samples, axis=-1)) ** 2, axis=-1)
-    frequency = frequencies(samples.shape[-1], dt)
-    highest = [frequency[np.searchsorted(e, share * e[-1])] for e in spectrum if e[-1] > 0]
-    return float(max(highest, default=0.0))
-
-
-def dominant_frequency(samples: RealArray, dt: float) -> float:
-    """Frequency of a record's largest smoothed Fourier amplitude.
-
-    Smoothed by the window of Konno and Ohmachi, so that a lone line does not decide.
-
-    Args:
-        samples: Shape ``(num_motions, num_samples)``.
-        dt: Time step [s].
-
-    Returns:
-        [Hz], above zero; of several motions that of the strongest.
-    """
-    strongest = samples[np.argmax(np.sum(samples**2, axis=-1))]
-    frequency = frequencies(len(strongest), dt)[1:]
-    amplitude = np.abs(fft.rfft(strongest))[1:]
-    if not amplitude.any():
-        return float(frequency[0])
-    centres = np.geomspace(frequency[0], frequency[-1], 400)
-    return float(centres[np.nanargmax(smoothed(frequency, amplitude, centres))])

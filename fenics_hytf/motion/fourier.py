@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Fourier amplitude of a motion, and its smoothing for the eye.
+"""Fourier amplitude of a motion, its smoothing for the eye, and where it is largest.
 
 The amplitude |∫a e^{-iωt} dt| is |â_k| dt on the lines of the discrete transform. It is smoothed
 by the window of Konno and Ohmachi (1998), of equal width at all frequencies of a logarithmic axis:
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import fft
 
 from fenics_hytf.motion.spectra import frequencies, to_frequency
 
@@ -66,3 +67,24 @@ def smoothed(
         with np.errstate(invalid="ignore"):
             result[start : start + step] = (weight @ values) / total
     return result
+
+
+def dominant_frequency(samples: RealArray, dt: float) -> float:
+    """Frequency of a record's largest smoothed Fourier amplitude.
+
+    Smoothed by the window of Konno and Ohmachi, so that a lone line does not decide.
+
+    Args:
+        samples: Shape ``(num_motions, num_samples)``.
+        dt: Time step [s].
+
+    Returns:
+        [Hz], above zero; of several motions that of the strongest.
+    """
+    strongest = samples[np.argmax(np.sum(samples**2, axis=-1))]
+    frequency = frequencies(len(strongest), dt)[1:]
+    amplitude = np.abs(fft.rfft(strongest))[1:]
+    if not amplitude.any():
+        return float(frequency[0])
+    centres = np.geomspace(frequency[0], frequency[-1], 400)
+    return float(centres[np.nanargmax(smoothed(frequency, amplitude, centres))])

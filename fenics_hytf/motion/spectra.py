@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Discrete transforms of a lapse and the lines that carry energy.
+"""Discrete transforms of a lapse, the lines that carry energy and the band they lie in.
 
 Time dependence e^{+iωt}: a(t_j) = (1/N) Σ_k â_k e^{+2πi jk/N}, so the forward transform is
 scipy's real one. A pure harmonic over whole periods excites one line.
@@ -26,6 +26,13 @@ def frequencies(num_samples: int, dt: float) -> RealArray:
         [Hz], shape ``(num_samples // 2 + 1,)``, from 0 to the Nyquist frequency.
     """
     return fft.rfftfreq(num_samples, dt)
+
+
+def above(frequency: RealArray, max_frequency: float | None) -> npt.NDArray[np.bool_]:
+    """Which frequencies lie above a limit; none if it is ``None``, shape as given."""
+    # a line that is meant to be at the limit may lie a rounding above it
+    limit = np.inf if max_frequency is None else max_frequency * (1.0 + 1e-12)
+    return np.asarray(frequency > limit)
 
 
 def to_frequency(acceleration: npt.ArrayLike) -> ComplexArray:
@@ -94,7 +101,41 @@ def excited_lines(
             f"{frequency.size}"
         )
     excited = (amplitude > fraction * amplitude.max(axis=1, keepdims=True)).any(axis=0)
-    if max_frequency is not None:
-        # a line that is meant to be at the limit may lie a rounding above it
-        excited &= frequency <= max_frequency * (1.0 + 1e-12)
-    return np.flatnonzero(excited)
+    return np.flatnonzero(excited & ~above(frequency, max_frequency))
+
+
+def band_limited(samples: RealArray, dt: float, max_frequency: float | None) -> RealArray:
+    """A record without what lies above a frequency.
+
+    Args:
+        samples: Shape ``(num_motions, num_samples)``.
+        dt: Time step [s].
+        max_frequency: [Hz]; ``None`` leaves the record as it is.
+
+    Returns:
+        In the record's unit, same shape.
+    """
+    if max_frequency is None or max_frequency >= 0.5 / dt:
+        return samples
+    count = samples.shape[-1]
+    period = fft.next_fast_len(2 * count, real=True)  # nothing wraps round
+    spectrum = fft.rfft(samples, period, axis=-1)
+    spectrum[..., above(frequencies(period, dt), max_frequency)] = 0.0
+    return np.asarray(fft.irfft(spectrum, period, axis=-1)[..., :count])
+
+
+def energy_band(samples: RealArray, dt: float, share: float = 0.99) -> float:
+    """Frequency below which lies a share of a record's energy.
+
+    Args:
+        samples: Shape ``(num_motions, num_samples)``.
+        dt: Time step [s].
+        share: [-].
+
+    Returns:
+        [Hz]; of several motions the highest; nought for motions that are zero.
+    """
+    spectrum = np.cumsum(np.abs(fft.rfft(samples, axis=-1)) ** 2, axis=-1)
+    frequency = frequencies(samples.shape[-1], dt)
+    highest = [frequency[np.searchsorted(e, share * e[-1])] for e in spectrum if e[-1] > 0]
+    return float(max(highest, default=0.0))

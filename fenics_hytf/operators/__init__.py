@@ -6,6 +6,7 @@ from fenics_hytf.operators.forces import InternalForce, isotropic_stress
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
 from fenics_hytf.operators.rows import (
+    NORMAL_STRAINS,
     constrained_rows,
     displacement_rows,
     split_rows,
@@ -13,6 +14,7 @@ from fenics_hytf.operators.rows import (
 )
 
 __all__ = [
+    "NORMAL_STRAINS",
     "DashpotForm",
     "ElasticForm",
     "GeometricForm",

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.operators.forms import quadrature_degree
-from fenics_hytf.operators.rows import strain_rows
+from fenics_hytf.operators.rows import NORMAL_STRAINS, strain_rows
 from fenics_hytf.particles import Sites, cell_grid, gradient_matrices
 
 RealArray = npt.NDArray[np.float64]
@@ -35,7 +35,7 @@ def isotropic_stress(
         Stress in the same order [Pa], shape ``(n, num_strains)``.
     """
     stress = shear_modulus[:, None] * strain
-    normal = {2: 0, 3: 2, 6: 3}[strain.shape[1]]
+    normal = NORMAL_STRAINS[strain.shape[1]]
     stress[:, :normal] *= 2.0
     stress[:, :normal] += (lame_lambda * strain[:, :normal].sum(axis=1))[:, None]
     return stress

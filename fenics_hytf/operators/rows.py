@@ -16,6 +16,9 @@ from scipy import sparse
 
 from fenics_hytf.domain import Domain
 
+NORMAL_STRAINS = {2: 0, 3: 2, 6: 3}
+"""How many of so many Voigt components are normal ones; they come first."""
+
 
 def displacement_rows(S: sparse.csr_matrix, num_components: int) -> sparse.csr_matrix:
     """Rows that evaluate the displacement.

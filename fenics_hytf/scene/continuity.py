@@ -85,8 +85,15 @@ def continuity_rules(
         expected = 'nothing without complex_modulus = "maxwell"'
         yield Fault("solver.reference_frequency", toml_text(solver.reference_frequency), expected)
     dt, cut = motions[0].record.dt, solver.max_frequency
-    several = len(segments) > 1 and lapses.continuity == "transient"
-    if not several or cut is None or cut >= 0.5 / dt * (1 - 1e-9):
+    if len(segments) == 1 or lapses.continuity == "steady":
+        return
+    duration, nyquist = segments[0].num_samples * dt, 0.5 / dt
+    if nyquist * duration < _PERIODS * (1 - 1e-9):
+        name = "count" if lapses.duration is None else "duration"
+        expected = f"lapses of at least {2 * _PERIODS:g} samples: shorter transient ones do not stay together"
+        found = f"{toml_text(getattr(lapses, name))}, lapses of {segments[0].num_samples} samples"
+        yield Fault(f"lapses.{name}", found, expected)
+    if cut is None or cut >= nyquist * (1 - 1e-9):
         return
     found = toml_text(cut)
     band = _ABOVE_BAND * energy_band(_padded(motions), dt)
@@ -96,7 +103,6 @@ def continuity_rules(
             "energy, or none: with less, transient lapses drift apart"
         )
         yield Fault("solver.max_frequency", found, expected)
-    duration = segments[0].num_samples * dt
     if cut * duration < _PERIODS:
         expected = (
             f"at least {_PERIODS / duration:.3g} Hz with lapses of {duration:g} s (frequency times "

@@ -18,7 +18,6 @@ import zipfile
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import IO, Any
 
@@ -196,14 +195,10 @@ def read_checkpoint(folder: Path) -> Checkpoint | None:
         ) from error
 
 
-def versions() -> dict[str, str | None]:
-    """Versions of the programs that decide the last digits; ``None`` where one is not told."""
-    own = getattr(fenics_hytf, "__version__", None)
-    if own is None:
-        with suppress(PackageNotFoundError):  # a checkout that is run in place
-            own = version("fenics-hytf")
+def versions() -> dict[str, str]:
+    """Versions of the programs that decide the last digits."""
     return {
-        "fenics_hytf": own,
+        "fenics_hytf": fenics_hytf.__version__,
         "numpy": np.__version__,
         "dolfinx": dolfinx.__version__,
         "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),

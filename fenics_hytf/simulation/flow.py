@@ -8,22 +8,13 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fenics_hytf.frequency import SweepError
-from fenics_hytf.lapse import (
-    LapseError,
-)
-from fenics_hytf.particles import (
-    PointsNotFinite,
-    PointsOutside,
-)
+from fenics_hytf.lapse import LapseError
+from fenics_hytf.particles import PointsNotFinite, PointsOutside
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.checkpoint_folder import CheckpointFolder
 from fenics_hytf.simulation.errors import SimulationError
 from fenics_hytf.simulation.groups import form_groups
-from fenics_hytf.simulation.records import (
-    ProgressCallback,
-    Result,
-    SnapshotCallback,
-)
+from fenics_hytf.simulation.records import ProgressCallback, Result, SnapshotCallback
 from fenics_hytf.simulation.run import Run
 
 

@@ -23,9 +23,11 @@ from fenics_hytf.lapse import (
     FreeField,
     FreeFieldState,
     Ground,
+    Histories,
     LapseResult,
     Observer,
     ReceiverProbe,
+    Response,
     Solved,
     Spectra,
     cell_stress,
@@ -110,7 +112,7 @@ class Run:
         self._base_carried: RealArray
         self._base_before: RealArray
         self._start_field: RealArray | float = 0.0
-        self._owned: list[Equations | CellProbe | BaseProbe | FreeField] = []
+        self._owned: list[Equations | Continuity | CellProbe | BaseProbe | FreeField] = []
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -123,6 +125,7 @@ class Run:
             self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
             self._owned.append(self.equations)
             self.continuity: Continuity = choose_continuity(scene, self.domain, self.equations)
+            self._owned.append(self.continuity)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
             self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
             loop = scene.effects.equivalent_linear
@@ -202,15 +205,7 @@ class Run:
         excitation, response = solved.excitation, solved.response
         with self.clock.phase("response"):
             base = self._base.motion(response)
-            sites, numbers = self.receivers.sites(self.points)
-            probe = ReceiverProbe(
-                self.domain, self.equations.T, sites, numbers, len(self.receivers.names)
-            )
-            try:
-                histories = probe.histories(response, base)
-                moved = probe.at(response.unknowns_at(excitation.duration))
-            finally:
-                probe.destroy()
+            histories, moved = self._at_receivers(response, base)
             cells = self._cell_state(solved, base)
             outcrop = outcrop_motion(self.scene, self.domain, self.equations, response)
             carried = self._carried.copy()
@@ -246,6 +241,17 @@ class Run:
             )
         )
         self._report(index, "lapse", residual=self.lapses[-1].worst_residual)
+
+    def _at_receivers(self, response: Response, base: Spectra) -> tuple[Histories, RealArray]:
+        """Their histories, and what the lapse has moved them by at its end."""
+        sites, numbers = self.receivers.sites(self.points)
+        count = len(self.receivers.names)
+        probe = ReceiverProbe(self.domain, self.equations.T, sites, numbers, count)
+        try:
+            end = response.excitation.duration
+            return probe.histories(response, base), probe.at(response.unknowns_at(end))
+        finally:
+            probe.destroy()
 
     def _seam_error(self, solved: Solved, cells: CellState) -> float | None:
         """Jumps at the start of the lapse over the peaks in it."""
@@ -352,7 +358,7 @@ class Run:
                     self.scene,
                     self.domain,
                     self.points,
-                    lambda time: self._start_field + self._nodal_motion(solved, time),
+                    lambda instant: self._start_field + self._nodal_motion(solved, instant),
                     solved.moduli,
                     self.lapses[-1],
                     time,

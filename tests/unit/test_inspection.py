@@ -11,10 +11,9 @@ import pytest
 from mpi4py import MPI
 
 from fenics_hytf.cli.check import describe
-from fenics_hytf.lapse import Equations, choose_continuity, seed_points
+from fenics_hytf.lapse import Equations, choose_continuity, scheme_of, seed_points
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.scene import Scene
-from fenics_hytf.lapse import scheme_of
 from fenics_hytf.simulation import inspect, simulate
 from fenics_hytf.simulation.check import checked_domain
 

@@ -218,3 +218,14 @@ def test_free_field_hands_over_under_a_causal_law_only(lapses, law, bad):
     got = faults(lapses=lapses, solver=solver, boundary=FREE_FIELD)
     assert [fault.key for fault in got] == ["boundary.left", "boundary.right"] * bad
     assert all(fault.expected.startswith("not in this version") for fault in got)
+
+
+@pytest.mark.parametrize(
+    ("lapses", "key"), [({"count": 25}, "count"), ({"duration": 0.3}, "duration")]
+)
+def test_transient_lapses_have_twenty_samples(lapses, key):
+    (fault,) = faults(lapses=lapses)
+    assert fault.key == f"lapses.{key}"
+    assert "at least 20 samples" in fault.expected
+    assert not faults(lapses=lapses | {"continuity": "steady"})
+    assert not faults(lapses={"count": 20})

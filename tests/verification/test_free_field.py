@@ -189,3 +189,24 @@ def test_a_step_does_not_feel_its_sides(tmp_path, figure):
     for side in ("dashpot", "free"):
         worse = errors[side] / errors["free_field"]
         figure(f"the same with sides that are {side}, times as much", worse, 4.0, at_least=True)
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_lapses_hand_over_beyond_the_sides_as_well(base, figure):
+    """What columns carry from lapse to lapse holds the section as the section's own stress does."""
+    places = {"top": [7.0, HEIGHT], "mid": [7.0, 9.0]}
+    lapses = {
+        "lapses": {"count": 4, "continuity": "transient"},
+        "effects": {"rayleigh": {"alpha": 0.1, "beta": 1e-3}},
+        "solver": {"sweep": "direct", "complex_modulus": "maxwell"},
+    }
+    section = run(level("quadrilateral", 1), "free_field", base, "xy", places, **lapses)
+    ground = column(base, 1, **lapses)
+    name = f"level quadrilaterals on a base of {base}, free field, four lapses, against the column"
+    # What is left is of the starts of lapses, which differ where nodes of the side weigh half.
+    for quantity, limit in (
+        ("displacement", 1e-5),
+        ("velocity", 1e-3),
+        ("total_acceleration", 5e-3),
+    ):
+        figure(f"{name}: {quantity}", difference(section, ground, [0, 1], quantity), limit)

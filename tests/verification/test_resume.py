@@ -4,54 +4,18 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.restart import SCENE
 
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import CheckpointFolder, Result, simulate
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 ROUND_OFF = 1e-10  # of the largest value of a quantity
-
-SCENE = """
-title = "A section"
-[mesh]
-box = { size = [8.0, 6.0], cells = [4, 3], cell = "quadrilateral" }
-regions = [ { soil = "sand", below = 4.0 }, { soil = "fill" } ]
-[soil.sand]
-density = 1900.0
-shear_wave_velocity = 220.0
-poisson = 0.3
-curves = { model = "darendeli", plasticity_index = 0, mean_stress = 80e3 }
-[soil.fill]
-density = 1800.0
-shear_wave_velocity = 160.0
-poisson = 0.3
-damping = 0.03
-[[motion]]
-direction = "x"
-synthetic = { n = 128, dt = 0.04 }
-pga = 0.2
-[boundary]
-left = "tied"
-right = "tied"
-[lapses]
-count = 4
-[effects]
-equivalent_linear = { tolerance = 1e-2 }
-convection = true
-geometric_stiffness = true
-[solver]
-sweep = "reduced"
-[output]
-receivers = { top = [4.0, 6.0], rider = { point = [3.0, 5.0] } }
-"""
 
 
 class Stop(Exception):
@@ -192,76 +156,3 @@ def test_on_another_number_of_ranks_to_round_off(tmp_path, shared_path):
         if result is not None:
             assert_near(expected, arrays(result), ROUND_OFF)
     WORLD.Barrier()
-
-
-DYING = """
-import os, signal, sys
-from fenics_hytf.cli import main
-from fenics_hytf.simulation import checkpoint
-old, saves = os.replace, []
-def replace(part, path):
-    if str(path).endswith(checkpoint.FILE):
-        saves.append(path)
-        if len(saves) == int(sys.argv[1]):
-            with open(part, "r+b") as file:
-                file.truncate(os.path.getsize(part) // 2)
-            os.kill(os.getpid(), signal.SIGKILL)
-    old(part, path)
-os.replace = replace
-main(sys.argv[2:])
-"""
-
-
-def test_killed_while_a_checkpoint_is_written(tmp_path, monkeypatch):
-    """The one before is gone on with; all tables are those of the run that was not killed."""
-    monkeypatch.chdir(tmp_path)
-    Path("s.toml").write_text(SCENE)
-    hytf = [sys.executable, "-m", "fenics_hytf.cli", "run", "s.toml", "--no-plots", "--quiet"]
-    subprocess.run([*hytf, "-o", "whole"], check=True)
-    dying = [sys.executable, "-c", DYING, "2", *hytf[3:], "-o", "killed"]
-    for resume in ((), ("--resume",)):  # twice: in the second of each run's checkpoints
-        assert subprocess.run([*dying, *resume], check=False).returncode == -9
-        assert {p.name for p in Path("killed/checkpoint").iterdir()} == {
-            "state.npz",
-            "state.npz.part",
-        }
-    subprocess.run([*hytf, "-o", "killed", "--resume"], check=True)
-    names = sorted(p.name for p in Path("whole").iterdir())
-    assert names == sorted(p.name for p in Path("killed").iterdir())
-    assert "checkpoint" not in names
-    for name in names:
-        if not name.endswith(".json"):
-            assert Path("whole", name).read_bytes() == Path("killed", name).read_bytes(), name
-    whole, killed = (json.loads(Path(d, "summary.json").read_text()) for d in ("whole", "killed"))
-    for summary in (whole, killed):
-        for key in ("written", "wall_s", "peak_memory_bytes"):
-            del summary[key]
-        del summary["work"]["wall_s"]
-    assert whole == killed
-
-
-LIMITED = """
-import resource, sys
-from fenics_hytf.cli import main
-from fenics_hytf.simulation import checkpoint_folder
-old = checkpoint_folder.write_checkpoint
-def write(folder, meta, arrays):
-    if meta["lapse"] == 2:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))
-    old(folder, meta, arrays)
-checkpoint_folder.write_checkpoint = write
-main(sys.argv[1:])
-"""
-
-
-def test_a_limit_of_the_file_size(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("s.toml").write_text(SCENE)
-    command = [sys.executable, "-c", LIMITED, "run", "s.toml", "--no-plots", "--quiet"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 3 and len(done.stderr.splitlines()) == 1
-    assert "no room for the checkpoint (File too large)" in done.stderr
-    hytf = [sys.executable, "-m", "fenics_hytf.cli", "run", "s.toml", "--no-plots", "--resume"]
-    done = subprocess.run(hytf, capture_output=True, text=True, check=True)
-    assert "going on after lapse 1 (2 of 4)" in done.stderr
-    assert Path("s-result/summary.json").exists()
