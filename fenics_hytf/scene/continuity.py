@@ -90,7 +90,8 @@ def continuity_rules(
     duration, nyquist = segments[0].num_samples * dt, 0.5 / dt
     if nyquist * duration < _PERIODS * (1 - 1e-9):
         name = "count" if lapses.duration is None else "duration"
-        expected = f"lapses of at least {2 * _PERIODS:g} samples: shorter transient ones do not stay together"
+        least = 2 * _PERIODS
+        expected = f"lapses of at least {least:g} samples: shorter transient ones drift apart"
         found = f"{toml_text(getattr(lapses, name))}, lapses of {segments[0].num_samples} samples"
         yield Fault(f"lapses.{name}", found, expected)
     if cut is None or cut >= nyquist * (1 - 1e-9):
