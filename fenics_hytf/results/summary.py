@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fenics_hytf
-from fenics_hytf.motion import GRAVITY, Intensity, intensity_measures
+from fenics_hytf.motion import GRAVITY, Intensity, energy_band, intensity_measures
 from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.energy import ledger, totals, worst_seam_error
 from fenics_hytf.results.layers import layer_states
@@ -128,7 +128,14 @@ def _seam_warnings(result: Result) -> list[str]:
     if error is not None and error > _SEAM_ERROR:
         found.append(
             f"Displacement or velocity jumps at a seam between lapses by {100 * error:.2g} % of "
-            "its peak. Longer lapses, or a higher solver.max_frequency, make jumps smaller."
+            "its peak. Longer lapses, a higher solver.max_frequency or, at the Nyquist frequency, "
+            "a motion in shorter time steps make jumps smaller."
+        )
+    band, nyquist = energy_band(result.base_acceleration, result.dt), 0.5 / result.dt
+    if error is not None and error > 0.1 * _SEAM_ERROR and 2 * band > nyquist:
+        found.append(
+            f"The motion has energy up to {band:.3g} Hz, more than half its Nyquist frequency of "
+            f"{nyquist:.3g} Hz: transient lapses want it in shorter time steps."
         )
     energy = totals(result.lapses, _gdim(result))
     if energy is not None and (energy["worst_imbalance"] or 0.0) > _IMBALANCE:
