@@ -211,7 +211,7 @@ class _StressHistories:
         s = response.excitation.s
         self._response, self._carried = response, carried
         self._moduli = np.stack([p.constants.shear_modulus[cells] for p in parts], axis=1)
-        self._functions = np.stack([[p.function(complex(z)) for z in s] for p in parts])
+        self._functions = material.functions(s)
         self._start = None if response.start is None else response.start_through(parts)
 
     def __call__(self, spectra: Spectra, some: slice) -> RealArray:

@@ -81,24 +81,9 @@ class Material:
     real: ElasticConstants
     parts: tuple[Part, ...]
 
-    @property
-    def branches(self) -> tuple[Part, ...]:
-        """The parts that remember."""
-        return tuple(part for part in self.parts if part.relaxation_time is not None)
-
-    def shear_factor(self, s: ComplexArray, cells: npt.NDArray[np.integer]) -> ComplexArray:
-        """G(s) of some cells [Pa].
-
-        Args:
-            s: Complex frequencies [rad/s], shape ``(num_lines,)``.
-            cells: Their input numbers.
-
-        Returns:
-            Shape ``(len(cells), num_lines)``.
-        """
-        moduli = np.stack([part.constants.shear_modulus[cells] for part in self.parts], axis=1)
-        functions = np.stack([[part.function(complex(z)) for z in s] for part in self.parts])
-        return np.asarray(moduli @ functions, np.complex128)
+    def functions(self, s: ComplexArray) -> ComplexArray:
+        """f_j(s) of every part [-], shape ``(len(parts), num_lines)``."""
+        return np.array([[part.function(complex(z)) for z in s] for part in self.parts])
 
 
 def material(ground: Ground, moduli: Moduli, solver: Solver) -> Material:

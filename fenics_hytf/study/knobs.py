@@ -246,7 +246,8 @@ class Knobs:
     @property
     def _lapses_differ(self) -> bool:
         effects = self.scene.effects
-        return effects.equivalent_linear is not None or effects.convection
+        changing = (effects.equivalent_linear, effects.degradation)
+        return effects.convection or any(effect is not None for effect in changing)
 
     @property
     def _states_points(self) -> bool:
