@@ -25,9 +25,9 @@ from fenics_hytf.particles.sites import Sites
 
 RealArray = npt.NDArray[np.float64]
 
-# A term is told by the points if its mean square among them is this fraction of that in the cell. On
-# Gauss points it is 1; where all points of a cell have moved by a fifth of it, 0.1 to 0.02 for the
-# highest term in sections and less in solids, whose highest term no strain of theirs needs.
+# A term is told by the points if its mean square among them is this fraction of that in the cell.
+# On Gauss points it is 1; where all points of a cell have moved by a fifth of it, 0.1 to 0.02 for
+# the highest term in sections and less in solids, whose highest term no strain of theirs needs.
 _TOLD = 0.02
 
 

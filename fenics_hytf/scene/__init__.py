@@ -7,6 +7,7 @@ each with its key, what was found and what was expected. How anything is solved 
 
 from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
+from fenics_hytf.scene.continuity import short_lapses
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
 from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh, components_of
@@ -66,4 +67,5 @@ __all__ = [
     "examine",
     "identity",
     "rule_degrees",
+    "short_lapses",
 ]

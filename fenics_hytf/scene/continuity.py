@@ -88,12 +88,6 @@ def continuity_rules(
     if len(segments) == 1 or lapses.continuity == "steady":
         return
     duration, nyquist = segments[0].num_samples * dt, 0.5 / dt
-    if nyquist * duration < _PERIODS * (1 - 1e-9):
-        name = "count" if lapses.duration is None else "duration"
-        least = 2 * _PERIODS
-        expected = f"lapses of at least {least:g} samples: shorter transient ones drift apart"
-        found = f"{toml_text(getattr(lapses, name))}, lapses of {segments[0].num_samples} samples"
-        yield Fault(f"lapses.{name}", found, expected)
     if cut is None or cut >= nyquist * (1 - 1e-9):
         return
     found = toml_text(cut)
@@ -110,6 +104,25 @@ def continuity_rules(
             f"length from {_PERIODS:g}), or none, or longer lapses: shorter ones blow up"
         )
         yield Fault("solver.max_frequency", found, expected)
+
+
+def short_lapses(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault]:
+    """Transient lapses that are too short for any motion.
+
+    Args:
+        lapses: ``[lapses]``, resolved.
+        num_samples: Samples of a lapse.
+        count: Number of lapses.
+
+    Yields:
+        The fault.
+    """
+    least = 2 * round(_PERIODS)  # f_max at the Nyquist frequency
+    if count > 1 and lapses.continuity == "transient" and num_samples < least:
+        name = "count" if lapses.duration is None else "duration"
+        found = f"{toml_text(getattr(lapses, name))}, lapses of {num_samples} samples"
+        expected = f"lapses of at least {least} samples: shorter transient ones drift apart"
+        yield Fault(f"lapses.{name}", found, expected)
 
 
 def _names(raw: dict[str, Any], section: str, key: str) -> bool:

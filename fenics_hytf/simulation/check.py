@@ -16,7 +16,15 @@ from fenics_hytf.domain import (
     side_column,
 )
 from fenics_hytf.lapse import column_supports
-from fenics_hytf.scene import Calm, Fault, Scene, SceneError, Sections, default_kind
+from fenics_hytf.scene import (
+    Calm,
+    Fault,
+    Scene,
+    SceneError,
+    Sections,
+    default_kind,
+    short_lapses,
+)
 from fenics_hytf.simulation.receivers import receiver_faults
 
 
@@ -36,6 +44,9 @@ def mesh_faults(
     if scene.mesh is None:
         return None, []
     domain, faults = examine(scene, comm)
+    if isinstance(scene, Scene):
+        segments = scene.segments
+        faults += short_lapses(scene.lapses, segments[0].num_samples, len(segments))
     if domain is None:
         return None, faults
     try:

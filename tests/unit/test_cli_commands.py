@@ -96,7 +96,12 @@ def test_run_writes_a_finished_result(here, hytf):
     ids=str,
 )
 def test_a_transient_run_ends_with_its_seams(here, hytf, settings, words):
-    transient = ("lapses.count=2", "lapses.continuity='transient'")
+    transient = (
+        "motion.0.harmonic.cycles=2",
+        "motion.0.harmonic.samples=64",
+        "lapses.count=2",
+        "lapses.continuity='transient'",
+    )
     code, out, err = hytf("run", "s.toml", "--no-plots", "--set", *transient, *settings)
     assert code == 0, err
     rows = [line for line in out.splitlines() if line.startswith("  seams ")]
