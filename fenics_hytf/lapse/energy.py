@@ -85,7 +85,7 @@ class Course:
         self.time = given.dt * np.arange(given.num_samples + 1, dtype=np.float64)
 
     def coordinates(self, derivative: int = 0, relaxation_time: float | None = None) -> RealArray:
-        """X at every sample.
+        """Coordinates x at every sample.
 
         Args:
             derivative: Order of the time derivative.

@@ -23,6 +23,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
+from scipy import sparse
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import AffineLoads, Columns
@@ -54,7 +55,6 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.soil import RELAXATION_TIMES
 
 RealArray = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 
 class Handover:
@@ -81,6 +81,7 @@ class Handover:
         self.fields = scheme.carried(domain.num_components)
         self._force = InternalForce(domain)
         self._centres = cell_centres(domain.mesh, 0, domain.num_owned_cells)
+        self._resampling: list[sparse.csr_matrix] = []
         self._excitation: Excitation
         self._segment: Segment
         self._at_gauss: State
@@ -104,9 +105,11 @@ class Handover:
     def begin(self, points: Points, excitation: Excitation) -> None:
         """Read what the points carry, at the Gauss points and in the middle of cells."""
         self._excitation = excitation
-        mesh, degree = self._domain.mesh, self._domain.V.ufl_element().degree
-        self._at_gauss = State.of(points, resample_matrix(mesh, points, degree, self._force.sites))
-        self._at_centres = State.of(points, resample_matrix(mesh, points, degree, self._centres))
+        if not self._resampling or self._scene.effects.convection:  # else points stay in place
+            mesh, degree = self._domain.mesh, self._domain.V.ufl_element().degree
+            places = (self._force.sites, self._centres)
+            self._resampling = [resample_matrix(mesh, points, degree, there) for there in places]
+        self._at_gauss, self._at_centres = (State.of(points, R) for R in self._resampling)
         S = transfer_matrix(points, self._domain.V)
         self.destroy()
         momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
@@ -152,7 +155,7 @@ class Handover:
     def _starts(
         self, equations: LapseEquations, material: Material, forces: list[PETSc.Vec]
     ) -> Columns:
-        """C of the start functions, from velocity, acceleration and its rate at the start."""
+        """Coefficients of the start functions, from velocity, acceleration and its rate."""
         motion = self._record.derivatives[:, :, self._segment.start]
         viscous = [(C, 1.0) for C in equations.viscous]
         taus = [*(part.relaxation_time for part in material.parts), FADING]
