@@ -1,0 +1,437 @@
+# SPDX-License-Identifier: MIT
+"""Marches of a slip: Newmark's block, a system of two masses marched in time, pyslammer."""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from time import perf_counter
+from types import ModuleType
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.optimize import brentq
+from scipy.signal import fftconvolve
+
+from fenics_hytf.motion import (
+    GRAVITY,
+    ConvolutionQuadrature,
+    SlipError,
+    SlipHistory,
+    decoupled_slip,
+    march,
+    recorded,
+    refined,
+    rigid_slip,
+)
+
+G = 9.81
+STEP = 0.005  # [s]
+
+
+# ---------------------------------------------------------------- Newmark's block
+
+
+def sine(dt: float) -> np.ndarray:
+    """Five cycles of 1 Hz and 0.5 g, and rest up to 8 s."""
+    time = dt * np.arange(round(8 / dt))
+    return np.where(time < 5, 0.5 * G * np.sin(2 * np.pi * time), 0.0)
+
+
+def sine_slip() -> float:
+    """Of a rigid block that yields at 0.25 g, in closed form: it sticks before a cycle is over."""
+    amplitude, limit, omega = 0.5 * G, 0.25 * G, 2 * np.pi
+    start = np.arcsin(0.5) / omega
+
+    def rate(t):
+        return amplitude / omega * (np.cos(omega * start) - np.cos(omega * t)) - limit * (t - start)
+
+    stop = brentq(rate, 0.3, 1.0, xtol=1e-14)
+    span = stop - start
+    sines = np.sin(omega * stop) - np.sin(omega * start)
+    cosine = np.cos(omega * start)
+    once = amplitude * (cosine * span / omega - sines / omega**2) - limit * span**2 / 2
+    return 5 * once
+
+
+def test_newmarks_block_in_closed_form(figure):
+    exact = sine_slip()
+    assert exact == pytest.approx(0.7863, abs=5e-5)
+    errors = []
+    for dt in (0.01, STEP, 0.0025, 0.00125):
+        drive = sine(dt)
+        slip = rigid_slip(drive, 0.25 * G, dt).slip[-1]
+        # the same as the coupled march of a mass without memory
+        alone = np.eye(1, drive.size)[0] * 4e3
+        coupled = march(4e3 * drive, 4e3 * 0.25 * G, alone, dt).slip[-1]
+        assert coupled == pytest.approx(slip, rel=1e-12)
+        errors.append(abs(slip / exact - 1))
+    figure("rigid block, sine, 5 ms", errors[1], 6.2e-4)
+    figure("rigid block, sine, 1.25 ms", errors[3], 4e-5)  # of second order
+    assert decoupled_slip(30 * drive, 30 * 0.25 * G, 30.0, dt).slip[-1] == pytest.approx(slip)
+
+
+def test_constant_force_from_rest(figure):
+    """λ = a t²/2: the jump of α at sample 0 counts by half, which makes it of second order."""
+    for dt in (0.02, 0.01):
+        history = rigid_slip(np.full(101, 3.0), 1.0, dt)
+        time = dt * np.arange(101)
+        assert history.acceleration[0] == pytest.approx(1.0)
+        np.testing.assert_allclose(history.acceleration[1:], 2.0, rtol=1e-12)
+        np.testing.assert_allclose(history.rate[10:], 2.0 * time[10:], rtol=1e-6)
+        error = np.abs(history.slip - time**2).max() / dt**2
+        # it stays the same however long slip goes on
+        figure("constant force: error of slip over a δt²", error / 2.0, 0.75 + 1e-9)
+
+
+def test_a_history_is_one_of_the_formula():
+    random = np.random.default_rng(4)
+    driving = np.cumsum(random.normal(size=400))
+    weights = 2.0 * np.exp(-0.1 * np.arange(450)) * np.cos(0.3 * np.arange(450))
+    rate = 0.7
+    history = march(driving, 1.5, weights, 0.1, start_rate=rate)
+    past = -rate * 0.1 * np.arange(4, 0, -1)
+    slip = np.concatenate([past, history.slip])
+    assert (np.diff(slip) >= 0).all() and history.num_steps == 400
+    twice = np.convolve([1.5, -2.0, 0.5], [1.5, -2.0, 0.5]) / 0.1**2
+    alpha = np.convolve(slip, twice)[4:404]
+    np.testing.assert_allclose(history.acceleration, alpha, atol=1e-10 * np.abs(alpha).max())
+    once = np.convolve(slip, [1.5, -2.0, 0.5])[4:404] / 0.1
+    np.testing.assert_allclose(history.rate, np.maximum(once, 0), atol=1e-10 * once.max())
+    # where it slips the force is Q_y, where it does not it is not above
+    force = driving - np.convolve(weights, alpha)[:400]
+    force[0] = driving[0] - 2 * weights[0] * alpha[0]
+    slips = np.diff(slip)[3:] > 0
+    assert 50 < slips.sum() < 350
+    scale = np.abs(force).max()
+    np.testing.assert_allclose(force[slips], 1.5, atol=1e-9 * scale)
+    assert force[~slips].max() <= 1.5 + 1e-9 * scale
+
+
+def pieces(drive: np.ndarray, limit: float, dt: float, count: int) -> float:
+    """Slip of a rigid block that is handed over from piece to piece with its rate."""
+    rate, total = 0.0, 0.0
+    edges = np.linspace(0, drive.size - 1, count + 1).astype(int)
+    for first, last in pairwise(edges):
+        part = drive[first : last + 1]
+        kernel = np.eye(1, part.size)[0]
+        history = march(part, limit, kernel, dt, start_rate=rate)
+        rate, total = history.rate[-1], total + history.slip[-1]
+    return total
+
+
+@pytest.mark.parametrize("count", [2, 7, 16, 32, 64])
+def test_pieces_of_a_rigid_block(count, figure):
+    whole = rigid_slip(sine(STEP), 0.25 * G, STEP).slip[-1]
+    change = abs(pieces(sine(STEP), 0.25 * G, STEP, count) / whole - 1)
+    figure(f"rigid block in {count} pieces", change, 5e-3)
+
+
+def test_it_stops_at_the_most_slip():
+    drive, limit = sine(STEP), 0.25 * G
+    whole = rigid_slip(drive, limit, STEP)
+    kernel = np.eye(1, drive.size)[0]
+    stopped = march(drive, limit, kernel, STEP, most_slip=0.3)
+    steps = stopped.num_steps
+    assert stopped.slip[-1] > 0.3 >= stopped.slip[-2]
+    for name in ("slip", "rate", "acceleration"):
+        values = getattr(stopped, name)
+        assert values.shape == (steps,)
+        np.testing.assert_array_equal(values, getattr(whole, name)[:steps])
+    # what stopped goes on from the sample where it stopped
+    rest = march(drive[steps - 1 :], limit, kernel, STEP, stopped.rate[-1])
+    together = stopped.slip[-1] + rest.slip[-1]
+    assert together == pytest.approx(whole.slip[-1], rel=2e-3)
+    assert march(drive, limit, kernel, STEP, most_slip=1.0).num_steps == drive.size
+
+
+# ---------------------------------------------------------------- two masses above a seam
+
+
+@dataclass(frozen=True)
+class TwoMasses:
+    """A spring that yields one way below two masses, damped by the mass and in the upper spring.
+
+    Attributes:
+        mass_damping: α of C = αM [1/s].
+    """
+
+    mass_damping: float
+    mass = np.array([1.5, 1.0])
+    seam = 300.0
+    spring = 120.0
+    spring_damping = 0.4
+    phi = np.ones(2)
+
+    @property
+    def M(self) -> np.ndarray:
+        return np.diag(self.mass)
+
+    @property
+    def C(self) -> np.ndarray:
+        return self.mass_damping * self.M + self.spring_damping * np.array([[1, -1], [-1, 1.0]])
+
+    @property
+    def K(self) -> np.ndarray:
+        spring = self.spring * np.array([[1, -1], [-1, 1.0]])
+        return spring + np.diag([self.seam, 0.0])
+
+    def kernel(self, s: np.ndarray, damped: bool = True) -> np.ndarray:
+        """P = (φᵀb − bᵀA⁻¹b)/s² with b = (s²M + sC)φ, or with s²Mφ alone."""
+        z = s[:, None, None]
+        A = z**2 * self.M + z * self.C + self.K
+        b = (z**2 * self.M + (z * self.C if damped else 0.0)) @ self.phi
+        w = np.linalg.solve(A, b[..., None])[..., 0]
+        return (b @ self.phi - np.sum(b * w, axis=1)) / s**2
+
+    def weights(self, num: int, dt: float, damped: bool = True) -> np.ndarray:
+        quadrature = ConvolutionQuadrature(num, dt)
+        return quadrature.weights(self.kernel(quadrature.s, damped))
+
+    def linear(self, force: np.ndarray, dt: float, start: np.ndarray) -> np.ndarray:
+        """w and ẇ, shape (4, n), exact for a force (2, n) that is linear from step to step."""
+        inverse = np.linalg.inv(self.M)
+        rates = np.zeros((8, 8))
+        rates[:2, 2:4] = rates[4:6, 6:8] = np.eye(2)
+        rates[2:4, :4] = -inverse @ np.hstack([self.K, self.C])
+        rates[2:4, 4:6] = inverse
+        step = expm(rates * dt)
+        state = np.empty((4, force.shape[1]))
+        state[:, 0] = start
+        for n in range(force.shape[1] - 1):
+            slope = (force[:, n + 1] - force[:, n]) / dt
+            state[:, n + 1] = step[:4] @ np.concatenate([state[:, n], force[:, n], slope])
+        return state
+
+    def elastoplastic(self, drive: np.ndarray, dt: float, limit: float) -> float:
+        """Slip by the average acceleration method, with return mapping of the seam's force."""
+        above = self.K - np.diag([self.seam, 0.0])
+        effective = above + 2 / dt * self.C + 4 / dt**2 * self.M
+        slipping = np.linalg.inv(effective)
+        sticking = np.linalg.inv(effective + np.diag([self.seam, 0.0]))
+        u, v, a, slip = np.zeros(2), np.zeros(2), drive[0] * self.phi, 0.0
+        for load in np.outer(drive[1:], self.mass):
+            right = load + self.M @ (4 / dt * v + a) + self.C @ v - above @ u
+            step = sticking @ (right - [self.seam * (u[0] - slip), 0.0])
+            if self.seam * (u[0] + step[0] - slip) > limit:
+                step = slipping @ (right - [limit, 0.0])
+                slip = u[0] + step[0] - limit / self.seam
+            u, a = u + step, 4 / dt**2 * step - 4 / dt * v - a
+            v = 2 / dt * step - v
+        return slip
+
+
+LIMIT = 4.0  # [N], of the seam; the linear response drives it with four times as much
+
+
+def burst(dt: float, duration: float = 6.0) -> np.ndarray:
+    """Waves of 0.9 and 2.3 Hz that swell and fade every six seconds."""
+    time = dt * np.arange(round(duration / dt) + 1)
+    waves = np.sin(2 * np.pi * 0.9 * time) + 0.6 * np.sin(2 * np.pi * 2.3 * time + 1.0)
+    return 4.0 * waves * np.sin(np.pi * time / 6.0) ** 2
+
+
+def linear_driving(system: TwoMasses, drive: np.ndarray, dt: float) -> np.ndarray:
+    """Q_lin, which is the force of the seam."""
+    load = np.outer(system.mass, drive)
+    return system.seam * system.linear(load, dt, np.zeros(4))[0]
+
+
+@cache
+def exact_slip(mass_damping: float) -> float:
+    fine = STEP / 16
+    return TwoMasses(mass_damping).elastoplastic(burst(fine), fine, LIMIT)
+
+
+@pytest.mark.parametrize("mass_damping", [0.0, 1.0])
+def test_damping_of_the_mechanism_itself(mass_damping, figure):
+    """With C of the mass the kernel needs its terms Cφ; without it there are none."""
+    system = TwoMasses(mass_damping)
+    exact = exact_slip(mass_damping)
+    errors = []
+    for dt in (2 * STEP, STEP, STEP / 2):
+        drive = burst(dt)
+        driving = linear_driving(system, drive, dt)
+        slip = march(driving, LIMIT, system.weights(drive.size, dt), dt).slip[-1]
+        errors.append(abs(slip / exact - 1))
+    name = f"two masses, damping of mass {mass_damping:g}"
+    figure(f"{name}: slip at 10 ms", errors[0], 3e-3)
+    figure(f"{name}: slip at 5 ms", errors[1], 1e-3)
+    figure(f"{name}: slip at 2.5 ms", errors[2], 3e-4)
+    # the same without those terms, neither in P nor in the force
+    state = system.linear(np.outer(system.mass, drive), dt, np.zeros(4))
+    blind = system.weights(drive.size, dt, damped=False)
+    missed = system.phi @ system.C @ state[2:]
+    other = march(driving + missed, LIMIT, blind, dt).slip[-1]
+    if mass_damping:
+        figure("two masses: error without the terms Cφ", abs(other / exact - 1), 0.2, at_least=True)
+    else:
+        assert other == pytest.approx(slip, rel=1e-9)
+
+
+def test_a_march_of_20000_steps(figure):
+    """Its slip is that of the system marched in time, at the end of 100 s as in between."""
+    system, num = TwoMasses(0.0), 20_000
+    drive = np.where(np.arange(num) < 0.7 * num, burst(STEP, 101.0)[:num], 0.0)
+    driving = linear_driving(system, drive, STEP)
+    weights = system.weights(num, STEP)
+    march(driving[:10], LIMIT, weights, STEP)  # compiled
+    start = perf_counter()
+    history = march(driving, LIMIT, weights, STEP)
+    figure("20 000 steps", perf_counter() - start, 5.0, "s")
+    exact = system.elastoplastic(refined(drive, 2), STEP / 2, LIMIT)
+    assert exact > 10.0
+    figure("20 000 steps: error of slip", abs(history.slip[-1] / exact - 1), 5e-3)
+    assert np.ptp(history.slip[int(0.8 * num) :]) == 0.0  # at rest
+    force = driving - fftconvolve(weights, history.acceleration)[:num]
+    figure("20 000 steps: largest force over Q_y, above 1", force.max() / LIMIT - 1, 1e-9)
+    fading = np.abs(force[int(0.75 * num) :].reshape(10, -1)).max(axis=1)
+    assert (np.diff(fading) < 0).all()  # what is left is free vibration
+
+
+def handed_over(system: TwoMasses, drive: np.ndarray, count: int) -> float:
+    """Slip in pieces; stress and ẇ go over, and λ̇, whose steady part Cφλ̇ loads the next one."""
+    total, rate, state = 0.0, 0.0, np.zeros(4)
+    drag = system.C @ system.phi
+    for first, last in pairwise(np.linspace(0, drive.size - 1, count + 1).astype(int)):
+        load = np.outer(system.mass, drive[first : last + 1]) - rate * drag[:, None]
+        num = load.shape[1]
+        driving = system.seam * system.linear(load, STEP, state)[0]
+        weights = system.weights(num, STEP)
+        history = march(driving, LIMIT, weights, STEP, start_rate=rate)
+        alpha = history.acceleration.copy()
+        alpha[0] *= 2  # the whole of the jump
+        load -= np.outer(system.M @ system.phi, alpha) + np.outer(drag, history.rate - rate)
+        state = system.linear(load, STEP, state)[:, -1]
+        rate, total = history.rate[-1], total + history.slip[-1]
+    return total
+
+
+@cache
+def in_one_piece() -> float:
+    return handed_over(TwoMasses(1.0), burst(STEP), 1)
+
+
+@pytest.mark.parametrize("count", [2, 5, 8, 16, 32])
+def test_pieces_of_two_masses(count, figure):
+    assert in_one_piece() == pytest.approx(exact_slip(1.0), rel=1e-3)
+    change = abs(handed_over(TwoMasses(1.0), burst(STEP), count) / in_one_piece() - 1)
+    figure(f"two masses in {count} pieces", change, 5e-3)
+
+
+# ---------------------------------------------------------------- pyslammer
+
+RATIOS = (0.1, 0.2, 0.4, 0.6, 0.8)  # k_y over k_max
+COARSEST = "Northridge_1994_PAC-175"  # 20 ms
+MOTIONS = ("Kobe_1995_TAK-090", COARSEST, "Loma_Prieta_1989_HSP-000", "Chi-Chi_1999_TCU068-090")
+
+
+@pytest.fixture(scope="module")
+def pyslammer():
+    return pytest.importorskip("pyslammer", reason="pyslammer, an optional extra")
+
+
+def largest_difference(
+    pyslammer: ModuleType, acceleration: np.ndarray, dt: float
+) -> tuple[float, float]:
+    """Between this and pyslammer's slip, rigid and decoupled, relative; over all ratios."""
+    motion = pyslammer.GroundMotion(acceleration / GRAVITY, dt, "record")
+    column = {"height": 30.0, "vs_slope": 200.0, "vs_base": 1e6, "damp_ratio": 0.05}
+    # its own average acceleration of the column is the drive of both
+    average = np.array(pyslammer.Decoupled(1.0, motion, **column).HEA)
+    rigid, decoupled = [], []
+    for ratio in RATIOS:
+        limit = ratio * acceleration.max()
+        theirs = pyslammer.RigidAnalysis(limit / GRAVITY, motion).max_sliding_disp
+        rigid.append(rigid_slip(acceleration, limit, dt).slip[-1] / theirs - 1)
+        limit = ratio * average.max()
+        theirs = pyslammer.Decoupled(limit / GRAVITY, motion, **column).max_sliding_disp
+        mine = decoupled_slip(5e4 * average, 5e4 * limit, 5e4, dt)
+        decoupled.append(mine.slip[-1] / theirs - 1)
+    return float(np.abs(rigid).max()), float(np.abs(decoupled).max())
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_against_pyslammer(name, pyslammer, figure):
+    """At the step of the record, as it is used; its rigid block starts and stops at samples."""
+    record = recorded(name)
+    rigid, decoupled = largest_difference(pyslammer, record.acceleration, record.dt)
+    figure(f"{name}: rigid block and pyslammer's", rigid, 0.09)
+    figure(f"{name}: decoupled block and pyslammer's", decoupled, 0.02)
+
+
+def test_against_pyslammer_at_a_fine_step(pyslammer, figure):
+    """The two tend to each other."""
+    record = recorded(COARSEST)
+    rigid, decoupled = largest_difference(
+        pyslammer, refined(record.acceleration, 16), record.dt / 16
+    )
+    figure(f"{COARSEST}, 1.25 ms: rigid block and pyslammer's", rigid, 0.002)
+    figure(f"{COARSEST}, 1.25 ms: decoupled block and pyslammer's", decoupled, 5e-4)
+
+
+# ---------------------------------------------------------------- samples between samples
+
+
+def test_refined():
+    np.testing.assert_array_equal(refined([1.0, 3.0, -1.0], 2), [1, 2, 3, 1, -1])
+    samples = np.random.default_rng(1).normal(size=(2, 3, 7))
+    fine = refined(samples, 5)
+    assert fine.shape == (2, 3, 31)
+    np.testing.assert_array_equal(fine[..., ::5], samples)
+    np.testing.assert_allclose(np.diff(fine, 2)[..., :3], 0, atol=1e-14)
+    np.testing.assert_array_equal(refined(samples, 1), samples)
+    np.testing.assert_array_equal(refined([4.0], 3), [4.0])
+    for given, substeps in (([1.0], 0), ([1.0], 1.5), ([], 2), (1.0, 2)):
+        with pytest.raises(ValueError, match=r"substeps|samples"):
+            refined(given, substeps)
+
+
+# ---------------------------------------------------------------- what is refused
+
+GOOD = {"driving": np.ones(4), "yield_force": 0.5, "weights": np.ones(4), "dt": 0.1}
+
+
+def test_what_is_marched():
+    assert isinstance(march(**GOOD), SlipHistory)
+    longer = march(**(GOOD | {"weights": np.r_[np.ones(4), 7.0]}))
+    np.testing.assert_array_equal(longer.slip, march(**GOOD).slip)
+    assert march(**(GOOD | {"yield_force": -1.0})).slip[-1] > 0  # unstable at rest
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"driving": np.ones((2, 2))}, "driving: found shape"),
+        ({"driving": []}, "driving: found shape"),
+        ({"driving": [1.0, np.nan, 1.0, np.inf]}, "driving: found 2 that are not finite"),
+        ({"weights": np.ones(3)}, "weights: found 3; expected at least 4"),
+        ({"weights": [0.0, 1.0, 1.0, 1.0]}, "expected a positive mass"),
+        ({"weights": [np.inf, 1.0, 1.0, 1.0]}, "weights: found 1 that are not finite"),
+        ({"yield_force": np.inf}, "yield_force"),
+        ({"dt": 0.0}, "dt"),
+        ({"dt": np.nan}, "dt"),
+        ({"start_rate": -0.1}, "start_rate"),
+        ({"start_rate": np.nan}, "start_rate"),
+        ({"most_slip": 0.0}, "most_slip"),
+        ({"most_slip": np.nan}, "most_slip"),
+    ],
+)
+def test_what_is_not_marched(change, reason):
+    with pytest.raises(ValueError, match=reason):
+        march(**(GOOD | change))
+
+
+def test_blocks_that_are_refused():
+    for mass in (0.0, -1.0, np.nan):
+        with pytest.raises(ValueError, match="mass"):
+            decoupled_slip([1.0, 2.0], 0.5, mass, 0.1)
+    with pytest.raises(ValueError, match="drive"):
+        rigid_slip([np.nan], 0.5, 0.1)
+
+
+def test_a_kernel_of_no_passive_ground():
+    """Inertia that pushes: slip grows by an order of magnitude every step."""
+    weights = np.r_[1.0, np.full(499, -10.0)]
+    with pytest.raises(SlipError, match="causal and passive"):
+        march(np.ones(500), 0.5, weights, 0.1)
