@@ -23,7 +23,10 @@ _TIED = (("left", "right", 0), ("front", "back", 1))
 
 
 def constraint_matrix(
-    domain: Domain, boundary: Mapping[str, str], shaken: Sequence[int] = ()
+    domain: Domain,
+    boundary: Mapping[str, str],
+    shaken: Sequence[int] = (),
+    bare: npt.NDArray[np.bool_] | None = None,
 ) -> PETSc.Mat:
     """Build T.
 
@@ -34,6 +37,7 @@ def constraint_matrix(
             that ``base`` is rigid unless it is named.
         shaken: Components in which the base moves; something must be held in each, or stand on a
             compliant base.
+        bare: Owned nodes that no soil moves, shape ``(num_owned_nodes,)``; ``None`` for none.
 
     Returns:
         Matrix of zeros and ones, rows distributed as the displacement space, columns the unknowns
@@ -57,6 +61,8 @@ def constraint_matrix(
         _require_base(domain, held, shaken)
     image = _tied_nodes(domain, kinds)
     _share_holds(domain, held, image)
+    if bare is not None:
+        held |= _bare_families(domain, bare, image)[:, None]
     return _assemble(V, held, image)
 
 
@@ -169,6 +175,21 @@ def _share_holds(domain: Domain, held: npt.NDArray[np.bool_], image: dict[int, i
             flags[root] = flags[root] | flag if root in flags else flag
     for number in mine.tolist():
         held[number - first] |= flags[image.get(number, number)]
+
+
+def _bare_families(
+    domain: Domain, bare: npt.NDArray[np.bool_], image: dict[int, int]
+) -> npt.NDArray[np.bool_]:
+    """Bare nodes; of those that are tied the ones whose whole family is bare."""
+    bare = bare.copy()
+    first = domain.V.dofmap.index_map.local_range[0]
+    family = np.array(sorted(set(image) | set(image.values())), np.int64)
+    mine = family[(family >= first) & (family < first + len(bare))]
+    moved = [image.get(int(n), int(n)) for n in mine[~bare[mine - first]]]
+    moving = {root for part in domain.comm.allgather(moved) for root in part}
+    for number in mine.tolist():
+        bare[number - first] = image.get(number, number) not in moving
+    return bare
 
 
 def _assemble(V: FunctionSpace, held: npt.NDArray[np.bool_], image: dict[int, int]) -> PETSc.Mat:

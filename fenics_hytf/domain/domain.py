@@ -18,7 +18,7 @@ from mpi4py import MPI
 from fenics_hytf import _compat
 from fenics_hytf.domain.checks import loose_cells, refuse_inverted_cells
 from fenics_hytf.domain.files import read_mesh
-from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh
+from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh, emptied
 from fenics_hytf.scene import (
     Fault,
     Scene,
@@ -40,7 +40,8 @@ class Domain:
         mesh: Distributed mesh; ranks see the cells across their facets as ghosts.
         V: Continuous vector-valued Lagrange space of the displacement.
         region_names: Names of the regions, which are names of soils.
-        regions: Region of each local cell, ghosts included, shape ``(num_local_cells,)``.
+        regions: Region of each local cell, ghosts included, -1 where there is no soil at the start,
+            shape ``(num_local_cells,)``.
         boundaries: Local exterior facets by the name of the boundary.
         across: Communicator of the ranks that hold the same part of the mesh, one of each group of
             ranks that shares one.
@@ -212,11 +213,22 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
     if mesh is None:
         raise SceneError([])
     if mesh.column is not None:
-        return column_mesh(mesh.column), []
+        return emptied(column_mesh(mesh.column), mesh.empty), []
     if mesh.box is not None:
-        return box_mesh(mesh.box, mesh, soils), []
-    data = read_mesh(Path(mesh.file or ""), soils)
-    return data, list(_file_faults(scene, data))
+        return emptied(box_mesh(mesh.box, mesh, soils), mesh.empty), []
+    data = read_mesh(Path(mesh.file or ""), (*soils, *mesh.empty))
+    faults = _unknown_regions(mesh.empty, data)
+    data = emptied(data, mesh.empty)
+    return data, [*faults, *_file_faults(scene, data)]
+
+
+def _unknown_regions(empty: tuple[str, ...], data: MeshData) -> list[Fault]:
+    known = ", ".join(data.region_names)
+    return [
+        Fault(f"mesh.empty[{i}]", f"'{name}', no region of the mesh", f"one of {known}")
+        for i, name in enumerate(empty)
+        if name not in data.region_names
+    ]
 
 
 def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:

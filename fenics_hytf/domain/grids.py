@@ -8,7 +8,7 @@ dolfinx. Cells and their numbers in it are the *input cells* that results and me
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,7 @@ class MeshData:
         cells: Nodes of each cell in dolfinx's order, shape ``(num_cells, nodes_per_cell)``.
         cell_type: ``triangle``, ``quadrilateral``, ``tetrahedron`` or ``hexahedron``.
         degree: Degree of the geometry, 1 or 2.
-        region: Index into ``region_names``, shape ``(num_cells,)``.
+        region: Index into ``region_names``, -1 for a cell without soil, shape ``(num_cells,)``.
         region_names: Names of the regions, which are names of soils.
         planes: Boundaries that lie in a coordinate plane: name, axis and place [m].
         facets: Boundaries given by facets: name and nodes, shape ``(num_facets, n)``, in dolfinx's
@@ -45,6 +45,21 @@ class MeshData:
     region_names: tuple[str, ...]
     planes: dict[str, tuple[int, float]] = field(default_factory=dict)
     facets: dict[str, npt.NDArray[np.int64]] = field(default_factory=dict)
+
+
+def emptied(data: MeshData, empty: Sequence[str]) -> MeshData:
+    """A mesh whose regions of some names have no soil.
+
+    Args:
+        data: The mesh.
+        empty: Names of those regions.
+
+    Returns:
+        The mesh, with -1 as the region of their cells.
+    """
+    kept = [name for name in data.region_names if name not in empty]
+    number = [kept.index(name) if name in kept else -1 for name in data.region_names]
+    return replace(data, region=np.array(number, np.int32)[data.region], region_names=tuple(kept))
 
 
 def column_mesh(column: Column) -> MeshData:

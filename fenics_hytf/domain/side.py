@@ -68,6 +68,8 @@ def side_column(domain: Domain, name: str) -> SideColumn:
     beyond[cells] = np.searchsorted(levels, (low + high) / 2) - 1
     nodes = boundary_nodes(domain, name)
     nodes = nodes[nodes < domain.V.dofmap.index_map.size_local]
+    height = domain.V.tabulate_dof_coordinates()[nodes, up]
+    nodes = nodes[height <= levels[-1] * (1 + _SAME)]
     places = np.full((len(nodes), domain.gdim), width / 2)
     places[:, up] = domain.V.tabulate_dof_coordinates()[nodes, up]
     return SideColumn(column, beyond, nodes, places)
@@ -121,12 +123,14 @@ def _require_whole_side(domain: Domain, name: str) -> None:
 
 
 def _facets(domain: Domain, name: str) -> tuple[npt.NDArray[np.int32], RealArray, RealArray]:
-    """Local cells at a side, and the lowest and highest point of their facet on it."""
+    """Local cells with soil at a side, and the lowest and highest point of their facet on it."""
     mesh, fdim = domain.mesh, domain.mesh.topology.dim - 1
     facets = domain.boundaries[name]
     mesh.topology.create_connectivity(fdim, fdim + 1)
     links = mesh.topology.connectivity(fdim, fdim + 1)
     cells = np.array([links.links(f)[0] for f in facets], np.int32)
+    soil = domain.regions[cells] >= 0
+    facets, cells = facets[soil], cells[soil]
     # dolfinx 0.9 divides by the number of facets
     nodes = entities_to_geometry(mesh, fdim, facets) if len(facets) else np.empty((0, 1), np.int32)
     height = mesh.geometry.x[nodes, domain.gdim - 1]

@@ -11,12 +11,16 @@ from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
 from fenics_hytf.lapse.errors import (
+    BalanceError,
+    DetachedError,
     EmptyCellError,
     EquivalentLinearError,
+    GeometricInstability,
     LapseError,
     VolumeError,
 )
 from fenics_hytf.lapse.excitation import Excitation
+from fenics_hytf.lapse.filling import Filling, FillingSurvey
 from fenics_hytf.lapse.free_field import FreeField, FreeFieldState, column_supports
 from fenics_hytf.lapse.ground import Ground, Moduli, seed_points, survey
 from fenics_hytf.lapse.handover import Handover
@@ -26,10 +30,13 @@ from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
 from fenics_hytf.lapse.run import Observer, Solved, solve
 from fenics_hytf.lapse.scheme import Scheme, scheme_of
+from fenics_hytf.lapse.statics import Statics
+from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.lapse.whole_record import WholeRecord
 
 __all__ = [
     "Anderson",
+    "BalanceError",
     "BaseProbe",
     "CarriedCells",
     "CellPeaks",
@@ -37,14 +44,18 @@ __all__ = [
     "CellState",
     "Continuity",
     "CycleCount",
+    "DetachedError",
     "ElasticConstants",
     "EmptyCellError",
     "Energy",
     "Equations",
     "EquivalentLinearError",
     "Excitation",
+    "Filling",
+    "FillingSurvey",
     "FreeField",
     "FreeFieldState",
+    "GeometricInstability",
     "Ground",
     "Handover",
     "Histories",
@@ -61,7 +72,9 @@ __all__ = [
     "Scheme",
     "Solved",
     "Spectra",
+    "Statics",
     "Steady",
+    "Unknowns",
     "VolumeError",
     "WholeRecord",
     "cell_stress",

@@ -16,7 +16,8 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.lapse.equations import Equations, rock_factors
+from fenics_hytf.lapse.equations import Equations
+from fenics_hytf.lapse.material import rock_factors
 from fenics_hytf.lapse.response import Response, Spectra
 from fenics_hytf.operators import boundary_area, constrained_rows, mean_rows
 from fenics_hytf.scene import Scene

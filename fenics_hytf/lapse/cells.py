@@ -72,12 +72,22 @@ class CellProbe:
         domain: The domain.
         T: Constraint matrix.
         convention: Strain measure, see :func:`peak_shear_strain`.
+        filled: Cells with soil in the order of the input, shape ``(num_cells,)``; in others nothing
+            is seen. All are if ``None``.
 
     Groups of ranks with the same cells share out the blocks.
     """
 
-    def __init__(self, domain: Domain, T: PETSc.Mat, convention: str) -> None:
+    def __init__(
+        self,
+        domain: Domain,
+        T: PETSc.Mat,
+        convention: str,
+        filled: npt.NDArray[np.bool_] | None = None,
+    ) -> None:
         self._domain, self._convention = domain, convention
+        owned = domain.input_cells[: domain.num_owned_cells]
+        self._empty = None if filled is None else ~filled[owned]
         blocks = domain.comm.allreduce(-(-domain.num_owned_cells // _BLOCK), MPI.MAX)
         mine = range(blocks)[share(blocks, domain.across)]
         self._blocks: list[tuple[slice, PETSc.Mat, PETSc.Mat]] = []
@@ -132,6 +142,8 @@ class CellProbe:
         history = response.history(spectra)
         if carried is not None:
             history += carried.strain[some, :, None].astype(history.dtype)
+        if self._empty is not None:
+            history[self._empty[some]] = 0.0
         return history
 
     def peak_strain(self, response: Response, carried: CarriedCells | None = None) -> RealArray:
@@ -194,6 +206,8 @@ class CellProbe:
         """All cells in the order of the input, from the ranks that looked at them."""
         if self._domain.across.size > 1:
             self._domain.across.Allreduce(MPI.IN_PLACE, peak, MPI.MAX)
+        if self._empty is not None:
+            peak[self._empty] = 0.0
         return self._domain.gather_cells(peak)
 
 

@@ -51,7 +51,8 @@ def convect(
             shape ``(num_local_nodes, gdim)``.
         outside: What happens to a point that leaves the mesh.
         constants: Elastic constants of every cell in the order of the input, for points that carry
-            stress.
+            stress. Where lapses hand over, what the strain adds is the dynamic stress that points
+            carry besides, and the static one only goes with the ground.
         velocity: At the nodes at the end of the lapse [m/s], for points that carry it.
         acceleration: Likewise [m/s^2].
         density: Of each region when it was seeded [kg/m^3], to know a point's volume then.
@@ -72,8 +73,8 @@ def convect(
     for name, field in (("velocity", velocity), ("acceleration", acceleration)):
         if field is not None and name in points.history:
             points[name] = S @ field
-    moduli = {}
-    if constants is not None and "stress" in points.history:
+    moduli = {"lame_lambda": 0.0, "shear_modulus": 0.0}
+    if constants is not None and "dynamic_stress" not in points.history:
         cells = domain.input_cells[points.cell]
         moduli = {
             "lame_lambda": constants.lame_lambda[cells],
@@ -109,10 +110,12 @@ def cell_stress(domain: Domain, points: Points) -> RealArray:
         points: Points that carry stress.
 
     Returns:
-        Cauchy stress [Pa], ghosts included, shape ``(num_local_cells, gdim, gdim)``.
+        Cauchy stress [Pa], ghosts included, nought where there is none, shape
+        ``(num_local_cells, gdim, gdim)``.
     """
     weighted = np.column_stack([points.volume, points.volume[:, None] * points["stress"]])
     sums = np.zeros((domain.num_owned_cells, weighted.shape[1]))
     np.add.at(sums, points.cell, weighted)
     everyone = domain.gather_cells(sums)[domain.input_cells]
-    return to_tensor(everyone[:, 1:] / everyone[:, :1])
+    volume = np.where(everyone[:, :1] > 0, everyone[:, :1], 1.0)
+    return to_tensor(everyone[:, 1:] / volume)

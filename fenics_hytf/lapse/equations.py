@@ -20,12 +20,10 @@ from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx import la
-from dolfinx.fem import Function
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fenics_hytf.domain import Domain, constraint_matrix
+from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import (
     AffineLoads,
     DynamicSystem,
@@ -34,18 +32,20 @@ from fenics_hytf.frequency import (
     constant,
     radiation,
 )
+from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.ground import Ground
-from fenics_hytf.lapse.material import ElasticConstants, Material, Part
+from fenics_hytf.lapse.material import ElasticConstants, Material, Part, rock_factors
+from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.operators import (
     DashpotForm,
     ElasticForm,
     GeometricForm,
+    GhostForm,
     assemble_mass,
     rayleigh_damping,
 )
 from fenics_hytf.particles import Points, particle_mass_matrix, transfer_matrix
 from fenics_hytf.scene import Scene
-from fenics_hytf.soil import wave_factors
 
 RealArray = npt.NDArray[np.float64]
 
@@ -109,12 +109,14 @@ class Equations:
         self._geometric = GeometricForm(domain) if scene.effects.geometric_stiffness else None
         self.axes = tuple(domain.components.index(m.direction) for m in scene.motion)
         supports = scene.supports
-        self.T = constraint_matrix(domain, supports, self.axes)
+        self.unknowns = Unknowns(domain, supports, self.axes)
         sides = [name for name, kind in supports.items() if kind in ("dashpot", "free_field")]
         self._dashpots = DashpotForm(domain, sides) if sides else None
         self._side_forces = side_forces
         self.base_is_held = supports.get("base") != "compliant"
         self._K = self._elastic.create_matrix()
+        self._filling: Filling | None = None
+        self._ghost: GhostForm | None = None
         # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
         self._radiating: list[tuple[PETSc.Mat, ScalarFunction]] = []
@@ -134,9 +136,14 @@ class Equations:
         return self._domain.gdim
 
     @property
+    def T(self) -> PETSc.Mat:
+        """Constraint matrix, borrowed until other cells are filled."""
+        return self.unknowns.T
+
+    @property
     def num_unknowns(self) -> int:
         """Unknowns of all ranks."""
-        return int(self.T.getSize()[1])
+        return len(self.unknowns)
 
     @property
     def influence(self) -> list[PETSc.Vec]:
@@ -145,13 +152,55 @@ class Equations:
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        for owned in (self.T, self._K, *self._constrained.values(), *self._vectors()):
+        self._clear()
+        self.unknowns.destroy()
+        self._K.destroy()
+
+    def _clear(self) -> None:
+        """Destroy what is on the unknowns as they are."""
+        for owned in (*self._constrained.values(), *self._vectors()):
             owned.destroy()
+        self._constrained, self._radiating, self._influence, self._inertia = {}, [], [], []
         if self._mass_solver is not None:
             self._mass_solver.destroy()
+        self._mass_solver = None
 
     def _vectors(self) -> list[PETSc.Vec]:
         return [*self._influence, *self._inertia]
+
+    def occupy(self, filling: Filling) -> bool:
+        """Take note of which cells are filled, and how far (collective).
+
+        Args:
+            filling: The filling; the points are to be weighed after it.
+
+        Returns:
+            Whether the unknowns are others than before.
+        """
+        before, self._filling = self._filling, filling
+        if before is not None and filling.same_cells(before):
+            return False
+        self._clear()
+        self.unknowns.destroy()
+        self._K.destroy()
+        domain = self._domain
+        bare = filling.bare_nodes(domain)
+        self.unknowns = Unknowns(domain, self._scene.supports, self.axes, bare)
+        self._ghost = GhostForm(domain, filling.ghost_facets(domain))
+        self._K = self._ghost.create_matrix()
+        return True
+
+    @property
+    def cell_weight(self) -> RealArray | None:
+        """What each local cell counts, ghosts included [-]; ``None`` where all are full."""
+        return None if self._filling is None else self._filling.weight[self._domain.input_cells]
+
+    def _weighted(self, *values: RealArray) -> tuple[RealArray, ...]:
+        """Values of this rank's cells, ghosts included, by the weight of each cell."""
+        weight = self.cell_weight
+        if weight is None:
+            return values
+        return tuple(weight.reshape(-1, *[1] * (v.ndim - 1)) * v for v in values)
 
     def weigh(self, points: Points) -> None:
         """Rebuild M = SᵀM_pS (4) and the right-hand sides −TᵀM r from the points.
@@ -175,7 +224,10 @@ class Equations:
     def _pattern(self) -> None:
         """Give K its pattern, before any value is known, and the base its dashpots."""
         cells = len(self._domain.regions)
-        self._elastic.assemble(self._K, np.ones(cells), np.ones(cells))
+        if self._ghost is not None:
+            self._ghost.assemble(self._K, np.ones(cells))
+        else:
+            self._elastic.assemble(self._K, np.ones(cells), np.ones(cells))
         self._constrain("real", self._K)
         if not self.base_is_held:
             self._stand_on_rock(cells)
@@ -192,7 +244,7 @@ class Equations:
             parts = [(across, 0 * along, pressure), (0 * across, along, shear)]
         form = DashpotForm(self._domain, ["base"])
         for number, (normal, tangential, factor) in enumerate(parts):
-            form.assemble(self._K, normal, tangential)
+            form.assemble(self._K, *self._weighted(normal, tangential))
             self._assemblies["dashpot"] += 1
             matrix = self._constrain(f"base {number}", self._K)
             self._radiating.append((matrix, radiation(factor)))
@@ -222,7 +274,7 @@ class Equations:
         return self._constrained[name]
 
     def _stiffness(self, name: str, constants: ElasticConstants) -> PETSc.Mat:
-        self._elastic.assemble(self._K, *constants.at(self._domain.input_cells))
+        self._elastic.assemble(self._K, *self._weighted(*constants.at(self._domain.input_cells)))
         self._assemblies["elasticity"] += 1
         return self._constrain(name, self._K)
 
@@ -233,7 +285,7 @@ class Equations:
             stress: Cauchy stress of each local cell [Pa], shape ``(num_local_cells, gdim, gdim)``.
         """
         if self._geometric is not None:
-            self._geometric.assemble(self._K, stress)
+            self._geometric.assemble(self._K, *self._weighted(stress))
             self._assemblies["geometric"] += 1
             self._constrain("geometric", self._K)
 
@@ -254,6 +306,10 @@ class Equations:
             geometric = self._constrained["geometric"]
             terms.append((geometric, constant))
             stiff.append((geometric, 1.0))
+        if self._ghost is not None:
+            ghost = self._hold_edges(self._ghost, material.real)
+            terms.append((ghost, constant))
+            stiff.append((ghost, 1.0))
         terms += self._radiating
         damping = self._damping(parts, ground, material.real)
         system = DynamicSystem(terms, self._constrained["mass"], damping)
@@ -263,6 +319,14 @@ class Equations:
             [matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
             stiff,
         )
+
+    def _hold_edges(self, form: GhostForm, constants: ElasticConstants) -> PETSc.Mat:
+        """K_G, elastic at the frequency at which the modulus is G."""
+        across = self._domain.num_components == 1
+        modulus = constants.shear_modulus if across else constants.youngs_modulus
+        form.assemble(self._K, modulus[self._domain.input_cells])
+        self._assemblies["ghost"] += 1
+        return self._constrain("ghost", self._K)
 
     def _damping(
         self, parts: list[tuple[PETSc.Mat, Part]], ground: Ground, constants: ElasticConstants
@@ -287,7 +351,7 @@ class Equations:
         lame, shear = constants.at(self._domain.input_cells)
         density = ground.density[self._domain.input_cells]
         impedance = np.sqrt(density * (lame + 2 * shear)), np.sqrt(density * shear)
-        self._dashpots.assemble(self._K, *impedance)
+        self._dashpots.assemble(self._K, *self._weighted(*impedance))
         self._assemblies["dashpot"] += 1
         for side in self._side_forces:
             side.fasten(*impedance)
@@ -329,25 +393,6 @@ class Equations:
         """−TᵀM r of each motion [kg], borrowed until the points are weighed again."""
         return self._inertia
 
-    def collect(self, nodal: RealArray) -> PETSc.Vec:
-        """Force on the unknowns of what all ranks' cells or points do to their nodes (collective).
-
-        Args:
-            nodal: This rank's, at its local nodes, ghosts included, components fastest, shape
-                ``(num_local_nodes·num_components,)``.
-
-        Returns:
-            Tᵀ of their sum; the caller destroys it.
-        """
-        sums = Function(self._domain.V)
-        sums.x.array[:] = nodal
-        sums.x.scatter_reverse(la.InsertMode.add)
-        force, nodes = self.T.createVecs()
-        nodes.array[:] = sums.x.array[: nodes.getLocalSize()]
-        self.T.multTranspose(nodes, force)
-        nodes.destroy()
-        return force
-
     def accelerate(self, force: PETSc.Vec) -> RealArray:
         """M⁻¹ f on this rank's unknowns (collective), by conjugate gradients.
 
@@ -372,39 +417,6 @@ class Equations:
         values = x.array_r.real.copy()
         x.destroy()
         return values
-
-    def expand(self, q: RealArray) -> RealArray:
-        """Nodal field u = T q.
-
-        Args:
-            q: This rank's unknowns, shape ``(num_local_unknowns,)``.
-
-        Returns:
-            At the local nodes, ghosts included, shape
-            ``(num_local_nodes, num_components)``.
-        """
-        unknowns, nodes = self.T.createVecs()
-        unknowns.array[:] = q
-        self.T.mult(unknowns, nodes)
-        u = Function(self._domain.V)
-        u.x.array[: nodes.getLocalSize()] = nodes.array_r
-        u.x.scatter_forward()
-        unknowns.destroy()
-        nodes.destroy()
-        return u.x.array.real.reshape(-1, self._domain.num_components).copy()
-
-
-def rock_factors(scene: Scene) -> tuple[complex, complex]:
-    """Complex over real modulus of P and of S waves in the rock below a base.
-
-    Under the causal Maxwell law dashpots are real, ρV: the root of a modulus with memory has no
-    finite memory itself. With a damping ratio of 0.5 % in the rock that is 0.2 % in the motion.
-    """
-    rock, solver = scene.boundary.rock, scene.solver
-    assert rock is not None
-    if solver.complex_modulus == "maxwell":
-        return 1.0, 1.0
-    return wave_factors(rock.damping, rock.poisson, solver.complex_modulus, solver.keep)
 
 
 @dataclass(frozen=True)

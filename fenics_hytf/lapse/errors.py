@@ -27,14 +27,67 @@ class EquivalentLinearError(LapseError):
 
 
 class EmptyCellError(LapseError):
-    """The points have left a cell without any, which this version cannot compute with."""
+    """The points have left a cell without any where the scene does not reckon with it.
+
+    Attributes:
+        cells: Input indices of the cells.
+    """
 
     def __init__(self, cells: list[int]) -> None:
         self.cells = cells
         listed = ", ".join(str(cell) for cell in cells[:5])
         super().__init__(
             f"found {len(cells)} cells without material points, the first: {listed}; expected "
-            "points in every cell: partially filled meshes are not in this version"
+            "points in every cell: name the regions that points may move into in mesh.empty, and "
+            "cells may be filled in part"
+        )
+
+
+class DetachedError(LapseError):
+    """A body has come off the ground that is held.
+
+    Attributes:
+        cells: Input indices of its cells.
+    """
+
+    def __init__(self, cells: list[int]) -> None:
+        self.cells = cells
+        listed = ", ".join(str(cell) for cell in cells[:5])
+        super().__init__(
+            f"found {len(cells)} cells whose points no longer hang together with held ground, the "
+            f"first: {listed}; expected one body: let the scene park or delete such points "
+            "([points] detached)"
+        )
+
+
+class BalanceError(LapseError):
+    """The stress of the points does not come into balance with their weight.
+
+    Attributes:
+        left: What is out of balance, of the weight [-].
+    """
+
+    def __init__(self, left: float, limit: float) -> None:
+        self.left = left
+        super().__init__(
+            f"found {left:.3g} of the weight out of balance with the stress of the points; "
+            f"expected at most {limit:.3g}: seed more points a cell, or hold the ground better"
+        )
+
+
+class GeometricInstability(LapseError):  # named for what was found
+    """The stiffness is no longer definite: the stress that the ground carries makes it buckle.
+
+    Attributes:
+        negative: Modes without stiffness.
+    """
+
+    def __init__(self, negative: int) -> None:
+        self.negative = negative
+        super().__init__(
+            f"found a stiffness with {negative} negative modes; expected none: the ground buckles "
+            "under its own weight (a level layer does where ρgH/G nears 1); look at the modulus of "
+            "the softest soil, or leave effects.geometric_stiffness out"
         )
 
 

@@ -354,6 +354,8 @@ def _level_ground(scene: Scene, gdim: int) -> Scene:
     still = {
         "convection": False,
         "geometric_stiffness": False,
+        "gravity": None,
+        "sliding": None,
         "calm": None,
         "degradation": None,
     }

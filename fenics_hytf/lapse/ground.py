@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from fenics_hytf.domain import Domain, distance_to_sides
 from fenics_hytf.lapse.errors import EmptyCellError
+from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.particles import Points, seed
 from fenics_hytf.scene import Scene
 from fenics_hytf.soil import Curve
@@ -38,6 +39,8 @@ class Ground:
         absorbing: Damping ratio that an absorbing layer adds [-], or ``None`` without one.
         degradation: What counted cycles have left of the modulus [-], or ``None`` where nothing
             degrades.
+        filling: How far points fill the cells, or ``None`` where all are full; an empty cell has
+            the constants of the first soil, and they do not count.
 
     All but ``curves`` have the shape ``(num_cells,)``.
     """
@@ -50,11 +53,17 @@ class Ground:
     curves: tuple[Curve | None, ...]
     absorbing: RealArray | None = None
     degradation: RealArray | None = None
+    filling: Filling | None = None
+
+    @property
+    def filled(self) -> npt.NDArray[np.bool_]:
+        """Cells with soil, shape ``(num_cells,)``."""
+        return np.ones(len(self.region), bool) if self.filling is None else self.filling.filled
 
     @property
     def nonlinear(self) -> npt.NDArray[np.bool_]:
         """Cells whose soil has curves, shape ``(num_cells,)``."""
-        return np.array([curve is not None for curve in self.curves])[self.region]
+        return np.array([curve is not None for curve in self.curves])[self.region] & self.filled
 
     def secant(self, effective_strain: RealArray) -> Moduli:
         """Read the curves.
@@ -110,24 +119,26 @@ def seed_points(
     fields = []
     if scene.effects.convection:
         fields += ["velocity", "acceleration", "strain"]
-    if scene.effects.geometric_stiffness:
+    if scene.effects.geometric_stiffness or scene.effects.gravity is not None:
         fields += ["stress"]
     density = [scene.soil[name].density for name in domain.region_names]
     count = scene.mesh.points_in(domain.mesh.topology.cell_name())
-    points = seed(domain.mesh, domain.regions, density, count, fields)
+    regions = np.where(domain.regions < 0, len(density), domain.regions).astype(np.int32)
+    points = seed(domain.mesh, regions, [*density, 0.0], count, fields)
     for name, shape in carried.items():
         if name not in points.history:
             points.add(name, shape)
     return points
 
 
-def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
+def survey(scene: Scene, domain: Domain, points: Points, filling: Filling | None = None) -> Ground:
     """See which soil the points have brought where.
 
     Args:
         scene: The scene.
         domain: The domain.
-        points: The points; every cell holds some.
+        points: The points.
+        filling: How far they fill the cells; if ``None`` every cell holds some.
 
     Returns:
         The ground, the same on every rank.
@@ -148,18 +159,21 @@ def survey(scene: Scene, domain: Domain, points: Points) -> Ground:
     np.add.at(mine, (points.cell, points.region), points.volume)
     share = domain.gather_cells(mine)
     volume = share.sum(axis=1)
-    if not volume.all():
+    if filling is None and not volume.all():
         raise EmptyCellError([int(cell) for cell in np.flatnonzero(volume == 0)])
+    volume[volume == 0] = 1.0
     # A cell of one soil takes its constants as they stand, free of round-off.
     region = share.argmax(axis=1).astype(np.int32)
     density, shear_modulus, poisson, damping = np.where(
-        (share > 0).sum(axis=1)[:, None] == 1,
+        (share > 0).sum(axis=1)[:, None] <= 1,
         constants[region],
         share @ constants / volume[:, None],
     ).T
     curves = tuple(s.curve if with_curves else None for s in soils)
     absorbing = _absorbing_layer(scene, domain)
-    return Ground(region, density, shear_modulus, poisson, damping, curves, absorbing)
+    return Ground(
+        region, density, shear_modulus, poisson, damping, curves, absorbing, filling=filling
+    )
 
 
 def _absorbing_layer(scene: Scene, domain: Domain) -> RealArray | None:

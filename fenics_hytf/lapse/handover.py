@@ -37,6 +37,7 @@ from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
+from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.motion import (
     LapseRecord,
     Segment,
@@ -65,11 +66,20 @@ class Handover:
         domain: The domain.
         equations: Its equations.
         scheme: Its contour, and what points carry.
+        statics: Static stress and weight: once points have moved, what is out of balance acts on
+            the ground, (f_g − ∫Bᵀσ_static)/s on the right-hand side. ``None`` without gravity.
     """
 
     goes_on_from_nought = True
 
-    def __init__(self, scene: Scene, domain: Domain, equations: Equations, scheme: Scheme) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        domain: Domain,
+        equations: Equations,
+        scheme: Scheme,
+        statics: Statics | None = None,
+    ) -> None:
         self._scene, self._domain, self._equations = scene, domain, equations
         motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
         self._record = LapseRecord(motion, scene.dt)
@@ -87,6 +97,8 @@ class Handover:
         self._at_gauss: State
         self._at_centres: State
         self._momentum: PETSc.Vec | None = None
+        self._statics = statics if scene.effects.convection else None
+        self._imbalance: PETSc.Vec | None = None
         self._solved: LapseEquations
 
     def excite(self, segment: Segment) -> Excitation:
@@ -109,11 +121,15 @@ class Handover:
             mesh, degree = self._domain.mesh, self._domain.V.ufl_element().degree
             places = (self._force.sites, self._centres)
             self._resampling = [resample_matrix(mesh, points, degree, there) for there in places]
+        self._force.weigh(self._equations.cell_weight)
         self._at_gauss, self._at_centres = (State.of(points, R) for R in self._resampling)
         S = transfer_matrix(points, self._domain.V)
         self.destroy()
         momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
-        self._momentum = self._equations.collect(momentum.ravel())
+        self._momentum = self._equations.unknowns.collect(momentum.ravel())
+        if self._statics is not None and self._segment.index:
+            left = self._statics.imbalance(points)
+            self._imbalance = self._equations.unknowns.collect(left)
 
     def respond(self, solve: Solve, equations: LapseEquations, material: Material) -> Response:
         """The increment of the lapse, and its start."""
@@ -131,11 +147,11 @@ class Handover:
     def _forces(self, material: Material) -> list[PETSc.Vec]:
         """Forces of what is carried: f of each part of the law, and f_q."""
         state, cells = self._at_gauss, self._domain.input_cells[self._force.sites.cell]
-        rest = self._equations.collect(self._force(state.stress))
+        rest = self._equations.unknowns.collect(self._force(state.stress))
         forces = []
         for part in material.parts:
             stress = isotropic_stress(state.strain_of(part), *part.constants.at(cells))
-            forces.append(self._equations.collect(self._force(stress)))
+            forces.append(self._equations.unknowns.collect(self._force(stress)))
             rest.axpy(-1.0, forces[-1])
         return [*forces, rest]
 
@@ -145,12 +161,16 @@ class Handover:
         assert self._momentum is not None
         fades = [-fading(part.relaxation_time, s) for part in material.parts]
         carried = [np.ones_like(s), *fades, -fading(FADING, s)]
+        vectors = [self._momentum, *forces]
+        if self._imbalance is not None:
+            carried.append(fading(None, s))
+            vectors.append(self._imbalance)
         num_motions = len(inertia)
         shape = (num_motions + len(carried), num_motions + 1, len(s))
         coefficients = np.zeros(shape, np.complex128)
         coefficients[range(num_motions), range(num_motions)] = 1.0
         coefficients[num_motions:, -1] = carried
-        return AffineLoads([*inertia, self._momentum, *forces], coefficients)
+        return AffineLoads([*inertia, *vectors], coefficients)
 
     def _starts(
         self, equations: LapseEquations, material: Material, forces: list[PETSc.Vec]
@@ -186,6 +206,8 @@ class Handover:
         total = forces[0].duplicate()
         total.zeroEntries()
         self._equations.add_side_start(derivative, total)
+        if self._imbalance is not None and derivative == 0:
+            total.axpy(1.0, self._imbalance)
         for inertia, value in zip(self._equations.inertia, motion, strict=True):
             total.axpy(float(value), inertia)
         for force, factor in zip(forces, factors, strict=True):
@@ -219,7 +241,10 @@ class Handover:
         if self._segment.index == 0:
             return None
         S = transfer_matrix(points, self._domain.V)
-        u, v = (S @ self._equations.expand(response.unknowns_at(0.0, order)) for order in (0, 1))
+        u, v = (
+            S @ self._equations.unknowns.expand(response.unknowns_at(0.0, order))
+            for order in (0, 1)
+        )
         return largest(self._domain.comm, u), largest(
             self._domain.comm, v - points["dynamic_velocity"]
         )
@@ -276,7 +301,7 @@ class Handover:
 
         def added(relaxation_time: float | None = None) -> RealArray:
             unknowns = response.unknowns_at(end, relaxation_time=relaxation_time)
-            return self._force.strain(self._equations.expand(unknowns))
+            return self._force.strain(self._equations.unknowns.expand(unknowns))
 
         memory = state.memory
         if memory is not None:
@@ -305,7 +330,7 @@ class Handover:
 
         def at_end(derivative: int = 0, relaxation_time: float | None = None) -> RealArray:
             unknowns = response.unknowns_at(end, derivative, relaxation_time)
-            return self._equations.expand(unknowns)
+            return self._equations.unknowns.expand(unknowns)
 
         S = transfer_matrix(points, V)
         B = strain_rows(gradient_matrices(points, V), self._domain.num_components)
@@ -326,6 +351,8 @@ class Handover:
         points["dynamic_stress"] = stress + stress_of(State.of(points), material, cells)
 
     def destroy(self) -> None:
-        """Destroy the momentum that the lapse began with."""
-        if self._momentum is not None:
-            self._momentum.destroy()
+        """Destroy what the lapse began with."""
+        for vector in (self._momentum, self._imbalance):
+            if vector is not None:
+                vector.destroy()
+        self._momentum = self._imbalance = None

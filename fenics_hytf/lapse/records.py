@@ -39,6 +39,8 @@ class CellState:
             shape ``(num_cells,)``.
         degradation: What counted cycles have left of the modulus in the lapse [-], shape
             ``(num_cells,)``; ``None`` where nothing degrades.
+        fill: Volume of the points over that of the cell [-], shape ``(num_cells,)``; ``None`` where
+            all cells are full. An empty cell has no state.
     """
 
     region: npt.NDArray[np.int32]
@@ -54,6 +56,7 @@ class CellState:
     peak_displacement: RealArray
     change: RealArray
     degradation: RealArray | None = None
+    fill: RealArray | None = None
 
 
 @dataclass(frozen=True)

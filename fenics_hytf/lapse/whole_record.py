@@ -109,8 +109,8 @@ class WholeRecord:
         """SᵀM_p times displacement or velocity of the points less the driven one."""
         points, S = self._points, transfer_matrix(self._points, self._domain.V)
         carried = points["dynamic_velocity" if derivative else "dynamic_displacement"]
-        nodal = self._equations.expand(driven.unknowns_at(0.0, derivative))
-        return self._equations.collect(
+        nodal = self._equations.unknowns.expand(driven.unknowns_at(0.0, derivative))
+        return self._equations.unknowns.collect(
             (S.T @ (points.mass[:, None] * (carried - S @ nodal))).ravel()
         )
 
@@ -139,7 +139,10 @@ class WholeRecord:
         if not self._excitation.carries:
             return None
         S, comm = transfer_matrix(points, self._domain.V), self._domain.comm
-        u, v = (S @ self._equations.expand(response.unknowns_at(0.0, order)) for order in (0, 1))
+        u, v = (
+            S @ self._equations.unknowns.expand(response.unknowns_at(0.0, order))
+            for order in (0, 1)
+        )
         return (
             largest(comm, u - points["dynamic_displacement"]),
             largest(comm, v - points["dynamic_velocity"]),
@@ -153,7 +156,9 @@ class WholeRecord:
         """Displacement and velocity at the end of the lapse."""
         S, end = transfer_matrix(points, self._domain.V), response.excitation.duration
         for name, derivative in (("dynamic_displacement", 0), ("dynamic_velocity", 1)):
-            points[name] = S @ self._equations.expand(response.unknowns_at(end, derivative))
+            points[name] = S @ self._equations.unknowns.expand(
+                response.unknowns_at(end, derivative)
+            )
 
     def destroy(self) -> None:
         """None outlives a call."""

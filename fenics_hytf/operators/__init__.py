@@ -4,6 +4,7 @@
 from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
 from fenics_hytf.operators.forces import InternalForce, isotropic_stress
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
+from fenics_hytf.operators.ghost import GhostForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
 from fenics_hytf.operators.rows import (
     NORMAL_STRAINS,
@@ -12,13 +13,17 @@ from fenics_hytf.operators.rows import (
     split_rows,
     strain_rows,
 )
+from fenics_hytf.operators.secant import BULK_OVER_SHEAR, SecantForm
 
 __all__ = [
+    "BULK_OVER_SHEAR",
     "NORMAL_STRAINS",
     "DashpotForm",
     "ElasticForm",
     "GeometricForm",
+    "GhostForm",
     "InternalForce",
+    "SecantForm",
     "TractionForm",
     "assemble_mass",
     "boundary_area",

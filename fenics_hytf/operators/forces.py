@@ -49,7 +49,7 @@ class InternalForce:
 
     Attributes:
         sites: Gauss points of owned cells, cell by cell.
-        volume: Of each [m^3, in 2D m^2], shape ``(num_sites,)``.
+        volume: Of each, as far as its cell counts [m^3, in 2D m^2], shape ``(num_sites,)``.
     """
 
     def __init__(self, domain: Domain) -> None:
@@ -59,8 +59,17 @@ class InternalForce:
         cells = np.arange(owned, dtype=np.int32)
         self.sites = Sites(np.repeat(cells, len(X)), np.tile(X, (owned, 1)))
         _, det = cell_grid(mesh, cells, X)
-        self.volume = (weight * det).ravel()
+        self._whole = (weight * det).ravel()
+        self.volume = self._whole
         self._B = strain_rows(gradient_matrices(self.sites, domain.V), domain.num_components)
+
+    def weigh(self, weight: RealArray | None) -> None:
+        """Let cells count in part, as their stiffness does.
+
+        Args:
+            weight: Of each local cell [-], shape ``(num_local_cells,)``; ``None`` for whole cells.
+        """
+        self.volume = self._whole if weight is None else weight[self.sites.cell] * self._whole
 
     def __call__(self, stress: RealArray) -> RealArray:
         """The force of a stress.

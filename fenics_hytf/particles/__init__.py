@@ -15,7 +15,13 @@ from fenics_hytf.particles.kinematics import (
 )
 from fenics_hytf.particles.ledger import MassLedger
 from fenics_hytf.particles.mapping import inverse_map
-from fenics_hytf.particles.move import MoveReport, PointsNotFinite, PointsOutside, move
+from fenics_hytf.particles.move import (
+    MoveReport,
+    PointsNotFinite,
+    PointsOutside,
+    move,
+    take_out,
+)
 from fenics_hytf.particles.points import Points, quadrature_rule, seed
 from fenics_hytf.particles.resample import resample_matrix
 from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
@@ -51,6 +57,7 @@ __all__ = [
     "resolve_owners",
     "scatter_points",
     "seed",
+    "take_out",
     "to_components",
     "to_tensor",
     "transfer_matrix",

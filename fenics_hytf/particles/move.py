@@ -98,17 +98,36 @@ def move(
         "X": X,
         "displacement": points.displacement + displacement,
     }
-    if outside == "park":
-        points.parked = join([points.parked, take(arrays, gone)])
-    elif outside == "delete":
-        points.deleted += gone.size
-        points.deleted_mass += exact_sum(points.mass[gone])
+    _book(points, take(arrays, gone), outside)
     arrived = _exchange(comm, take(arrays, leaving), owner[owner >= 0])
     arrived |= {"cell": claimed, "X": claimed_X}
     points.assign(join([take(arrays, cells >= 0), arrived]))
     points.sort(mesh)
     ledger = points.ledger(comm, leaving.size)
     return MoveReport(ledger, comm.allreduce(moved.size))
+
+
+def take_out(
+    points: Points, gone: npt.NDArray[np.bool_], policy: Literal["park", "delete"]
+) -> None:
+    """Take points out of the mesh: they weigh no longer, and the ledger tells where they are.
+
+    Args:
+        points: Points, changed in place.
+        gone: Which of them, shape ``(len(points),)``.
+        policy: ``park`` or ``delete``.
+    """
+    _book(points, take(points.arrays(), gone), policy)
+    points.assign(take(points.arrays(), ~gone))
+
+
+def _book(points: Points, left: Arrays, policy: str) -> None:
+    """Enter points that leave into the account of mass."""
+    if policy == "park":
+        points.parked = join([points.parked, left])
+    elif policy == "delete":
+        points.deleted += len(left["id"])
+        points.deleted_mass += exact_sum(np.asarray(left["mass"], np.float64))
 
 
 def agree_on_points(

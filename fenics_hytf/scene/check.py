@@ -23,7 +23,7 @@ from fenics_hytf.scene.boundary import (
     outcrop_rules,
     read_boundary,
 )
-from fenics_hytf.scene.continuity import continuity_rules, resolve
+from fenics_hytf.scene.continuity import continuity_rules, resolve, sliding_rules
 from fenics_hytf.scene.faults import (
     NOT_YET,
     Fault,
@@ -118,6 +118,7 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         faults += _antiplane_rules(raw)
         faults += _calm_rules(raw, sections)
         faults += _degradation_rules(sections)
+        faults += _sliding_rules(sections)
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
         faults += _settle_continuity(raw, sections)
@@ -173,8 +174,13 @@ def _soil_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     mesh, soils = raw.get("mesh"), sections.soil
     if not isinstance(mesh, dict) or not soils:
         return
+    empty = as_list(mesh.get("empty"))
+    for i, name in enumerate(empty):
+        if name in soils:
+            expected = "the name of a region without soil"
+            yield Fault(join_key("mesh.empty", i), f"{toml_text(name)}, a soil", expected)
     for key, name in _named_soils(mesh):
-        if name not in soils:
+        if name not in soils and name not in empty:
             yield Fault(key, toml_text(name), f"one of the soils {', '.join(map(name_key, soils))}")
     lone = mesh.get("box") is None or mesh.get("column") is not None
     if not lone and not mesh.get("regions") and len(soils) > 1:
@@ -238,6 +244,19 @@ def _degradation_rules(sections: Sections) -> Iterator[Fault]:
             yield Fault(join_key(key, "soils", i), toml_text(name), expected)
 
 
+def _sliding_rules(sections: Sections) -> Iterator[Fault]:
+    """Sliding has weight to drive it, and strength to hold against it."""
+    effects = sections.effects
+    if effects is None or effects.sliding is None:
+        return
+    if effects.gravity is None:
+        yield Fault("effects.gravity", "nothing", "gravity, which drives what slides")
+    for name, soil in sections.soil.items():
+        if soil is not None and not soil.has_strength:
+            key = join_key("soil", name_key(name), "cohesion")
+            yield Fault(key, "no strength", "cohesion [Pa] or friction_angle [degrees] for sliding")
+
+
 def _num_lapses(sections: Sections) -> int | None:
     """Number of lapses, or ``None`` where it is not known or there is a fault."""
     lapses = sections.lapses
@@ -258,7 +277,7 @@ def _antiplane_rules(raw: dict[str, Any]) -> Iterator[Fault]:
     mesh, effects = raw.get("mesh"), raw.get("effects")
     if not (isinstance(mesh, dict) and mesh.get("kinematics") == "antiplane"):
         return
-    for name in ("convection", "geometric_stiffness"):
+    for name in ("convection", "geometric_stiffness", "gravity", "sliding", "locking"):
         if isinstance(effects, dict) and effects.get(name):
             expected = "nothing: antiplane motion leaves the points where they are in the section"
             yield Fault(f"effects.{name}", toml_text(effects[name]), expected)
@@ -284,8 +303,10 @@ def _time_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
 def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
     """What lapses hand over, once they and the motions are known."""
     motions = tuple(motion for motion in sections.motion if motion is not None)
-    lapses, solver = sections.lapses, sections.solver
-    if lapses is None or solver is None or not motions or len(motions) < len(sections.motion):
+    lapses, solver, effects = sections.lapses, sections.solver, sections.effects
+    if lapses is None or solver is None or effects is None:
+        return
+    if not motions or len(motions) < len(sections.motion):
         return
     dt = motions[0].record.dt
     if any(abs(motion.record.dt - dt) > 1e-9 * dt for motion in motions):  # a fault of its own
@@ -295,9 +316,11 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
         segments = split(longest, dt, lapses.count, lapses.duration)
     except (ValueError, OverflowError):  # a fault of its own
         return
-    lapses, solver = resolve(raw, lapses, solver, motions, segments)
+    lapses, solver = resolve(raw, lapses, solver, effects, motions, segments)
     sections.lapses, sections.solver = lapses, solver
     yield from continuity_rules(raw, lapses, solver, motions, segments)
+    if effects.sliding is not None:
+        yield from sliding_rules(raw, lapses, solver)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
     if handed_over and solver.complex_modulus != "maxwell" and sections.boundary is not None:
         for name, kind in sections.boundary.kinds.items():

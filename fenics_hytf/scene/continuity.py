@@ -18,7 +18,7 @@ import numpy.typing as npt
 from fenics_hytf.motion import Segment, dominant_frequency, energy_band
 from fenics_hytf.scene.faults import Fault, toml_text
 from fenics_hytf.scene.motion import MotionInput
-from fenics_hytf.scene.settings import Lapses, Solver
+from fenics_hytf.scene.settings import Effects, Lapses, Solver
 from fenics_hytf.scene.table import as_list
 
 _ABOVE_BAND = 2.0  # f_max over the frequency below which 99 % of the energy lies
@@ -29,15 +29,17 @@ def resolve(
     raw: dict[str, Any],
     lapses: Lapses,
     solver: Solver,
+    effects: Effects,
     motions: tuple[MotionInput, ...],
     segments: list[Segment],
 ) -> tuple[Lapses, Solver]:
-    """Fill in what hangs on the number of lapses and on the motion.
+    """Fill in what hangs on the number of lapses, on sliding and on the motion.
 
     Args:
         raw: The raw table of the scene.
         lapses: ``[lapses]``.
         solver: ``[solver]``.
+        effects: ``[effects]``; a mechanism that slides needs a causal law, and goes on.
         motions: The motions.
         segments: The lapses.
 
@@ -49,10 +51,11 @@ def resolve(
     if not _names(raw, "lapses", "continuity"):
         tables = as_list(raw.get("motion"))
         harmonic = all(isinstance(t, dict) and "harmonic" in t for t in tables)
-        continuity = "steady" if len(segments) == 1 or harmonic else "transient"
+        once = len(segments) == 1 or harmonic
+        continuity = "steady" if once and effects.sliding is None else "transient"
     if not _names(raw, "solver", "complex_modulus"):
         several = continuity == "transient" and len(segments) > 1
-        law = "maxwell" if several else "hysteretic"
+        law = "maxwell" if several or effects.sliding is not None else "hysteretic"
     frequency = solver.reference_frequency
     if frequency is None and law == "maxwell":
         frequency = dominant_frequency(_padded(motions), motions[0].record.dt)
@@ -60,6 +63,25 @@ def resolve(
         lapses.model_copy(update={"continuity": continuity}),
         solver.model_copy(update={"complex_modulus": law, "reference_frequency": frequency}),
     )
+
+
+def sliding_rules(raw: dict[str, Any], lapses: Lapses, solver: Solver) -> Iterator[Fault]:
+    """What a mechanism that slides needs of lapses and law.
+
+    Args:
+        raw: The raw table of the scene.
+        lapses: ``[lapses]``, resolved.
+        solver: ``[solver]``, resolved.
+
+    Yields:
+        The faults.
+    """
+    if lapses.continuity != "transient":
+        expected = '"transient": what slides does not come back at the end of a period'
+        yield Fault("lapses.continuity", toml_text(lapses.continuity), f"{expected}, with sliding")
+    if solver.complex_modulus != "maxwell":
+        expected = '"maxwell": the kernel of a mechanism that slides needs a causal law'
+        yield Fault("solver.complex_modulus", toml_text(solver.complex_modulus), expected)
 
 
 def continuity_rules(

@@ -6,9 +6,9 @@ In 2D y is up, in 3D z is up, and the base of a column or box is at height 0.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -129,6 +129,8 @@ class Mesh(Table):
         box: Box (2D or 3D).
         file: Mesh file, absolute path.
         regions: Which soil is where in a box.
+        empty: Names of regions without soil, background for points to move into; where any is
+            named, cells may be filled in part.
         degree: Degree of the displacement, 1 or 2.
         kinematics: ``plane_strain`` or ``antiplane`` (SH: motion across the plane, ``z``) in 2D,
             ``None`` in 3D and for a file that leaves it open.
@@ -142,6 +144,7 @@ class Mesh(Table):
     box: Box | None = Field(None, description="a table with size and cells")
     file: Path | None = Field(None, description="the path of a mesh file")
     regions: Several[Region] = Field((), description="an array of tables with soil and a place")
+    empty: Several[Name] = Field((), description="names of regions without soil")
     degree: Literal[1, 2] = Field(1, description="1 or 2")
     kinematics: Literal["plane_strain", "antiplane"] | None = Field(
         None, description='"plane_strain" or "antiplane"'
@@ -149,8 +152,6 @@ class Mesh(Table):
     points_per_cell: Count | None = Field(
         None, description="a whole number that the cells have a quadrature rule for"
     )
-
-    later: ClassVar[Mapping[str, str]] = {"empty": "every region needs a soil"}
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -205,7 +206,8 @@ class Mesh(Table):
     def soil_names(self) -> tuple[str, ...]:
         """Soils named by layers or regions, each once; empty for a lone soil or a file."""
         names = [layer.soil for layer in self.column.layers] if self.column is not None else []
-        return tuple(dict.fromkeys(names + [region.soil for region in self.regions]))
+        names += [region.soil for region in self.regions]
+        return tuple(name for name in dict.fromkeys(names) if name not in self.empty)
 
     def points_in(self, cell_type: str) -> int:
         """Points a cell, once the mesh file too has told its cell type.
@@ -274,7 +276,7 @@ def layout(raw: object) -> Mesh | None:
     """The column or box with its regions, whatever the rest of a raw ``[mesh]`` table holds."""
     if not isinstance(raw, dict):
         return None
-    shape = {name: raw[name] for name in ("column", "box", "regions") if name in raw}
+    shape = {name: raw[name] for name in ("column", "box", "regions", "empty") if name in raw}
     return read_table(Mesh, shape, "mesh")[0]
 
 

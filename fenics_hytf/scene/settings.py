@@ -150,9 +150,41 @@ class Degradation(Table):
         return DegradationLaw(self.threshold, self.s, self.r, self.minimum)
 
 
-_THIS_EFFECTS = (
-    "equivalent_linear, rayleigh, geometric_stiffness, convection, degradation and calm are"
-)
+class Gravity(Table):
+    """Weight, and the stress that the ground has before it is shaken.
+
+    Attributes:
+        acceleration: [m/s^2].
+        initial_stress: ``k0``: vertical stress from the weight above, horizontal stress K0 times
+            it, then brought into balance; ``elastic``: gravity switched on in elastic ground.
+            ``None``: ``k0`` where the ground is level, ``elastic`` elsewhere.
+    """
+
+    acceleration: Positive = Field(9.80665, description="a positive acceleration [m/s2]")
+    initial_stress: Literal["k0", "elastic"] | None = Field(None, description='"k0" or "elastic"')
+
+
+class Sliding(Table):
+    """Permanent displacement along a mechanism that yields (see SLIDING in the documentation).
+
+    Attributes:
+        time_step: Of the march of the slip, at most [s].
+        response: ``coupled``: slip and vibration act on each other; ``rigid``: ground that does not
+            deform but along the mechanism, for the run-out of slopes that fail.
+        new_mechanism: Slip after which a new mechanism is sought, over the size of a cell [-].
+        unstable_at_rest: Whether the slope may be one that does not stand under its weight.
+        longest: How long it may go on after the end of the motion to come to rest [s].
+    """
+
+    time_step: Annotated[float, Field(gt=0, le=0.05)] = Field(
+        0.005, description="a time step above 0, at most 0.05 [s]"
+    )
+    response: Literal["coupled", "rigid"] = Field("coupled", description='"coupled" or "rigid"')
+    new_mechanism: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.3, description="a number above 0, at most 1 [-]"
+    )
+    unstable_at_rest: bool = Field(False, description="true or false")
+    longest: NotNegative = Field(30.0, description="a time not below 0 [s]")
 
 
 class Effects(Table):
@@ -165,6 +197,9 @@ class Effects(Table):
         convection: Points move between lapses.
         degradation: Its parameters, or ``None``.
         calm: The absorbing layer, or ``None``.
+        gravity: Weight and initial stress, or ``None``.
+        sliding: Permanent displacement, or ``None``.
+        locking: Volumetric strain is the mean of a cell, against locking near ν = 0.5.
     """
 
     equivalent_linear: EquivalentLinear | None = Field(None, description="a table, true or false")
@@ -173,10 +208,13 @@ class Effects(Table):
     convection: bool = Field(False, description="true or false")
     degradation: Degradation | None = Field(None, description="a table, true or false")
     calm: Calm | None = Field(None, description="a table with sides, thickness and damping")
+    gravity: Gravity | None = Field(None, description="a table, true or false")
+    sliding: Sliding | None = Field(None, description="a table, true or false")
+    locking: bool = Field(False, description="true or false")
 
-    later: ClassVar[Mapping[str, str]] = dict.fromkeys(
-        ("gravity", "sliding", "softening", "locking", "k0"), _THIS_EFFECTS
-    )
+    later: ClassVar[Mapping[str, str]] = {
+        "softening": "sliding is, which gives permanent displacement"
+    }
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -194,8 +232,9 @@ class Effects(Table):
             raw["equivalent_linear"] = {} if loop else None
         elif isinstance(loop, dict):
             raw["equivalent_linear"] = EquivalentLinear.prepare(loop)
-        if isinstance(raw.get("degradation"), bool):
-            raw["degradation"] = {} if raw["degradation"] else None
+        for name in ("degradation", "gravity", "sliding"):
+            if isinstance(raw.get(name), bool):
+                raw[name] = {} if raw[name] else None
         factors = (
             [rayleigh.get(n, 0.0) for n in Rayleigh.model_fields]
             if (isinstance(rayleigh, dict) and set(rayleigh) <= set(Rayleigh.model_fields))
@@ -218,10 +257,15 @@ class Points(Table):
 
     Attributes:
         outside: What happens to a point that leaves the mesh: ``error``, ``park`` or ``delete``.
+        detached: What happens to points whose cells no longer hang together with a boundary that
+            holds them.
     """
 
     outside: Literal["error", "park", "delete"] = Field(
         "error", description='"error", "park" or "delete"'
+    )
+    detached: Literal["error", "park", "delete"] = Field(
+        "park", description='"error", "park" or "delete"'
     )
 
 

@@ -52,6 +52,8 @@ class Soil(Table):
             beside its name.
         friction_angle: [degrees], or ``None``.
         cohesion: [Pa], or ``None``.
+        k0: Horizontal over vertical stress at rest [-]; that of elastic ground that cannot move
+            sideways if ``None``.
     """
 
     density: Positive = Field(description="a positive number [kg/m3]")
@@ -67,6 +69,9 @@ class Soil(Table):
         None, description="an angle from 0 to below 90 [degrees]"
     )
     cohesion: NotNegative | None = Field(None, description="a number not below 0 [Pa]")
+    k0: Annotated[float, Field(gt=0, le=3)] | None = Field(
+        None, description="a number above 0, at most 3 [-]"
+    )
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -87,6 +92,16 @@ class Soil(Table):
         if self.curves is None:
             return None
         return read_curves(self.curves, "curves", elastic=self.elastic)[0]
+
+    @property
+    def has_strength(self) -> bool:
+        """Whether a cohesion or a friction angle is given."""
+        return bool(self.cohesion or self.friction_angle)
+
+    @property
+    def at_rest(self) -> float:
+        """Horizontal over vertical stress at rest [-]."""
+        return self.poisson / (1 - self.poisson) if self.k0 is None else self.k0
 
     def damping_ratio(self, with_curves: bool) -> float:
         """Damping ratio at small strain [-].

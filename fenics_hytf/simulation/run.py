@@ -13,32 +13,27 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fenics_hytf.lapse import (
-    BaseProbe,
-    CellProbe,
     CellState,
     Continuity,
     CycleCount,
     Energy,
     Equations,
+    Filling,
+    FillingSurvey,
     FreeField,
     FreeFieldState,
     Ground,
-    Histories,
     LapseResult,
     Observer,
-    ReceiverProbe,
-    Response,
     Solved,
-    Spectra,
+    Statics,
     cell_stress,
     choose_continuity,
     convect,
     first_strain,
-    outcrop_motion,
     seed_points,
     solve,
     survey,
-    within_motion,
 )
 from fenics_hytf.motion import Segment
 from fenics_hytf.particles import (
@@ -54,7 +49,7 @@ from fenics_hytf.simulation.checkpoint_folder import CheckpointFolder
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.groups import Groups, require_same_parts
 from fenics_hytf.simulation.memory import peak_memory
-from fenics_hytf.simulation.receivers import Receivers
+from fenics_hytf.simulation.observation import Observation
 from fenics_hytf.simulation.records import (
     Progress,
     ProgressCallback,
@@ -107,12 +102,10 @@ class Run:
         self._strain_from = strain_from
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
-        # Displacement at the start of a lapse: of the receivers relative to the base, of the base.
-        self._carried: RealArray
-        self._base_carried: RealArray
-        self._base_before: RealArray
+        self._filling: FillingSurvey | None = None
+        self._statics: Statics | None = None
         self._start_field: RealArray | float = 0.0
-        self._owned: list[Equations | Continuity | CellProbe | BaseProbe | FreeField] = []
+        self._owned: list[Equations | Continuity | Observation | Statics | FreeField] = []
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -124,23 +117,26 @@ class Run:
             self.free_fields = self._level_ground()
             self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
             self._owned.append(self.equations)
-            self.continuity: Continuity = choose_continuity(scene, self.domain, self.equations)
+            if scene.effects.gravity is not None:
+                self._statics = Statics(scene, self.domain)
+                self._owned.append(self._statics)
+            self.continuity: Continuity = choose_continuity(
+                scene, self.domain, self.equations, self._statics
+            )
             self._owned.append(self.continuity)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
-            self.receivers = Receivers(self.domain, self.points, scene.output.receivers)
-            loop = scene.effects.equivalent_linear
-            self._probe = CellProbe(
-                self.domain, self.equations.T, loop.strain if loop is not None else "plane"
+            self.observation = Observation(
+                scene, self.domain, self.equations, self.continuity, self.points
             )
-            self._base = BaseProbe(self.domain, self.equations)
+            self._owned.append(self.observation)
+            if scene.mesh.empty:
+                self._filling = FillingSurvey(scene, self.domain)
+            else:
+                self.observation.look_at(None)
             cycles = scene.effects.degradation
             self._cycles = None if cycles is None else CycleCount(cycles, self.domain)
             names = self.domain.region_names
             self._density = np.array([scene.soil[name].density for name in names])
-            components = self.domain.num_components
-            self._carried = np.zeros((len(self.receivers.names), components))
-            self._base_carried = np.zeros(components)
-            self._owned += [self._probe, self._base]
         self._ledger = self.points.ledger(self.domain.comm)
 
     def _level_ground(self) -> list[FreeField]:
@@ -162,10 +158,29 @@ class Run:
         if self._ground is not None and not self.scene.effects.convection:
             return
         with self.clock.phase("assembly"):
-            self._ground = survey(self.scene, self.domain, self.points)
+            filling = self._fill()
+            first, ground = (
+                self._ground is None,
+                survey(self.scene, self.domain, self.points, filling),
+            )
+            self._ground = ground
             self.equations.weigh(self.points)
+            if first and self._statics is not None and not self.lapses:
+                self._statics.settle(self.points, ground)
             if self.scene.effects.geometric_stiffness:
                 self.equations.stiffen(cell_stress(self.domain, self.points))
+
+    def _fill(self) -> Filling | None:
+        """See how far points fill the cells, where the scene lets them leave any."""
+        if self._filling is None:
+            return None
+        filling = self._filling(self.points)
+        others = self.equations.occupy(filling)
+        if others:
+            self.observation.look_at(filling.filled)
+        if self._statics is not None:
+            self._statics.occupy(filling, others)
+        return filling
 
     def solve_lapse(self, segment: Segment) -> Solved:
         """Transfer functions (5) of the lapse, with moduli that fit its strain."""
@@ -185,7 +200,7 @@ class Run:
             ground,
             excitation,
             self.continuity,
-            self._probe,
+            self.observation.probe,
             first_strain(self.scene, ground) if start is None else start,
             observer,
             self._strain_from,
@@ -202,18 +217,9 @@ class Run:
     def observe(self, solved: Solved, index: int, start: int) -> None:
         """Response of receivers and cells: û(ω) = h(ω) ü̂_b(ω) (6)."""
         assert self._ground is not None
-        excitation, response = solved.excitation, solved.response
         with self.clock.phase("response"):
-            base = self._base.motion(response)
-            histories, moved = self._at_receivers(response, base)
-            cells = self._cell_state(solved, base)
-            outcrop = outcrop_motion(self.scene, self.domain, self.equations, response)
-            carried = self._carried.copy()
-            if self.continuity.goes_on_from_nought:
-                at_end = self._base.at(response.unknowns_at(excitation.duration))
-                self._carried += moved - at_end
-                self._base_before = self._base_carried.copy()
-                self._base_carried += at_end
+            seen = self.observation.see(solved, self._ground, self.points)
+        excitation, response = solved.excitation, solved.response
         self.lapses.append(
             LapseResult(
                 index=index,
@@ -227,31 +233,20 @@ class Run:
                 worst_residual=float(response.sweep.residuals.max(initial=0.0)),
                 loop=solved.loop,
                 frequency=excitation.frequency,
-                transfer=histories.transfer,
-                displacement=histories.displacement + carried[:, :, None],
-                velocity=histories.velocity,
-                acceleration=histories.acceleration,
-                total_acceleration=histories.total_acceleration,
-                within=within_motion(response, base),
-                outcrop=outcrop,
-                cells=cells,
-                seam_error=self._seam_error(solved, cells),
+                transfer=seen.histories.transfer,
+                displacement=seen.histories.displacement,
+                velocity=seen.histories.velocity,
+                acceleration=seen.histories.acceleration,
+                total_acceleration=seen.histories.total_acceleration,
+                within=seen.within,
+                outcrop=seen.outcrop,
+                cells=seen.cells,
+                seam_error=self._seam_error(solved, seen.cells),
                 energy=self._energy(solved),
                 ledger=self._ledger,
             )
         )
         self._report(index, "lapse", residual=self.lapses[-1].worst_residual)
-
-    def _at_receivers(self, response: Response, base: Spectra) -> tuple[Histories, RealArray]:
-        """Their histories, and what the lapse has moved them by at its end."""
-        sites, numbers = self.receivers.sites(self.points)
-        count = len(self.receivers.names)
-        probe = ReceiverProbe(self.domain, self.equations.T, sites, numbers, count)
-        try:
-            end = response.excitation.duration
-            return probe.histories(response, base), probe.at(response.unknowns_at(end))
-        finally:
-            probe.destroy()
 
     def _seam_error(self, solved: Solved, cells: CellState) -> float | None:
         """Jumps at the start of the lapse over the peaks in it."""
@@ -266,32 +261,6 @@ class Run:
         stored = None if before is None else before.stored[1]
         return self.continuity.energy(solved.response, solved.material, stored)
 
-    def _cell_state(self, solved: Solved, base: Spectra) -> CellState:
-        assert self._ground is not None
-        ground, moduli = self._ground, solved.moduli
-        carried = self.continuity.carried(solved.material)
-        if carried is not None:
-            relative = carried.displacement - self._base_carried
-            carried = replace(carried, displacement=relative)
-        peaks = self._probe.peaks(solved.response, solved.material, base, carried)
-        change = solved.loop.last
-        effective = solved.effective_strain
-        return CellState(
-            region=ground.region,
-            centroid=self.domain.centroids(),
-            shear_modulus=moduli.shear_modulus,
-            g_over_gmax=moduli.shear_modulus / ground.shear_modulus,
-            damping=moduli.damping,
-            effective_strain=peaks.strain if effective is None else effective,
-            peak_strain=peaks.strain,
-            peak_stress=peaks.stress,
-            peak_acceleration=peaks.acceleration,
-            peak_velocity=peaks.velocity,
-            peak_displacement=peaks.displacement,
-            change=np.zeros(len(ground.region)) if change is None else change,
-            degradation=ground.degradation,
-        )
-
     def count_cycles(self, solved: Solved) -> None:
         """Cycles of the lapse lower the shear modulus of the next."""
         if self._cycles is None:
@@ -299,7 +268,9 @@ class Run:
         assert self._ground is not None
         with self.clock.phase("response"):
             carried = self.continuity.carried(solved.material)
-            self._cycles.count(self._probe, solved.response, carried, self._ground.region)
+            self._cycles.count(
+                self.observation.probe, solved.response, carried, self._ground.region
+            )
 
     def hand_over(self, solved: Solved) -> None:
         """Points take what goes on in the next lapse."""
@@ -315,9 +286,11 @@ class Run:
         if not self.continuity.goes_on_from_nought:
             return 0.0
         S = transfer_matrix(self.points, self.domain.V)
-        carried = self.points["dynamic_displacement"] - self._base_before
-        momentum = self.equations.collect((S.T @ (self.points.mass[:, None] * carried)).ravel())
-        field = self.equations.expand(self.equations.accelerate(momentum))
+        carried = self.points["dynamic_displacement"] - self.observation.base_before
+        momentum = self.equations.unknowns.collect(
+            (S.T @ (self.points.mass[:, None] * carried)).ravel()
+        )
+        field = self.equations.unknowns.expand(self.equations.accelerate(momentum))
         momentum.destroy()
         return field
 
@@ -344,7 +317,7 @@ class Run:
     def _nodal_motion(self, solved: Solved, time: float, derivative: int = 0) -> RealArray:
         """Displacement of the nodes relative to the base, or a time derivative of it."""
         unknowns = solved.response.unknowns_at(time, derivative)
-        return self.equations.expand(unknowns) - self._base.at(unknowns)
+        return self.equations.unknowns.expand(unknowns) - self.observation.base_at(unknowns)
 
     def show(self, solved: Solved, index: int, stop: int, snapshot: SnapshotCallback) -> None:
         """Hand points and fields to whoever writes them."""
@@ -375,8 +348,8 @@ class Run:
                 work=self._work,
                 ledger=self._ledger,
                 points=points or {},
-                carried=self._carried,
-                base_carried=self._base_carried,
+                carried=self.observation.carried,
+                base_carried=self.observation.base_carried,
                 effective_strain=self._effective_strain,
                 free_fields=tuple(column.state() for column in self.free_fields),
                 cycles=None if self._cycles is None else self._cycles.state,
@@ -391,7 +364,8 @@ class Run:
         self.lapses = list(state.lapses)
         self.points = scatter_points(state.points, self.domain.mesh)
         self._ledger = state.ledger
-        self._carried, self._base_carried = state.carried, state.base_carried
+        self.observation.carried = state.carried
+        self.observation.base_carried = state.base_carried
         self._effective_strain = state.effective_strain
         for column, column_state in zip(self.free_fields, state.free_fields, strict=True):
             column.restore(column_state)
@@ -435,8 +409,8 @@ class Run:
             group_size=self.domain.comm.size,
             components=self.domain.components,
             directions=tuple(m.direction for m in self.scene.motion),
-            receivers=self.receivers.names,
-            places=self.receivers.places,
+            receivers=self.observation.receivers.names,
+            places=self.observation.receivers.places,
             region_names=self.domain.region_names,
             dt=self.scene.dt,
             base_acceleration=self.scene.base_acceleration,

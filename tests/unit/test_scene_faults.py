@@ -225,20 +225,34 @@ def test_receiver_names_that_are_no_column(name):
     assert len(got) == 1 and "letters, digits" in got[0].expected and "\n" not in str(got[0])
 
 
-@pytest.mark.parametrize(
-    ("values", "key"),
-    [
-        ({"mesh__empty": ["air"]}, "mesh.empty"),
-        *(
-            ({f"effects__{name}": value}, f"effects.{name}")
-            for name in ("gravity", "sliding", "softening", "locking", "k0")
-            for value in (True, {"a": 1})
-        ),
-    ],
-)
-def test_what_a_later_version_brings_is_said(values, key):
-    got = faults(changed(**values))
-    assert [fault.key for fault in got] == [key]
+def test_a_region_without_soil_has_no_soil_of_its_name():
+    got = faults(changed(mesh__empty=["air", "sand"]))
+    assert [fault.key for fault in got][:1] == ["mesh.empty[1]"]
+    assert "a soil" in got[0].found
+
+
+def test_sliding_has_weight_and_strength():
+    data = changed(effects__sliding=True, soil__sand__cohesion=5e3)
+    assert [fault.key for fault in faults(data)] == ["soil.fill.cohesion", "effects.gravity"]
+
+
+def test_sliding_is_transient_under_a_causal_law():
+    wanted = {"effects__sliding": True, "effects__gravity": True}
+    strong = {f"soil__{name}__friction_angle": 30.0 for name in ("sand", "fill")}
+    data = changed(
+        **wanted, **strong, lapses__continuity="steady", solver__complex_modulus="kramer"
+    )
+    keys = [fault.key for fault in faults(data)]
+    assert keys == ["lapses.continuity", "solver.complex_modulus"]
+    settled = Scene.from_dict(changed(**wanted, **strong))
+    assert settled.lapses.continuity == "transient"
+    assert settled.solver.complex_modulus == "maxwell"
+
+
+@pytest.mark.parametrize("value", [True, {"a": 1}])
+def test_what_a_later_version_brings_is_said(value):
+    got = faults(changed(effects__softening=value))
+    assert [fault.key for fault in got] == ["effects.softening"]
     assert got[0].expected.startswith("not in this version; ")
     assert "; not in this version; " in str(got[0])
 
@@ -326,7 +340,7 @@ def test_every_fault_at_once():
         motion__1__synthetic__f2=0,
         boundary__top="x",
         lapses__count=-1,
-        effects__sliding=True,
+        effects__sliding=3,
         effects__rayleigh__alpha=-1,
         points__outside="lost",
         solver__max_frequency=1e9,
@@ -347,8 +361,8 @@ def test_every_fault_at_once():
         "motion[1].synthetic.f2",
         "boundary.top",
         "lapses.count",
-        "effects.sliding",
         "effects.rayleigh.alpha",
+        "effects.sliding",
         "points.outside",
         "solver.tolerance",
         "output.receivers.surface",

@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: MIT
+"""Static stress: what the ground carries before it is shaken, in balance with its weight.
+
+    f_int(σ) = ∫ Bᵀσ dV = Sᵀ M_p g = f_g
+
+Gravity is switched on in elastic ground, K u = f_g. Where K0 rules, horizontal stress is then set
+to K0 times the vertical one, level or not, and what that leaves out of balance is spread
+elastically. The stress lives on the points. As they move it goes with them, and what the ground in
+its new shape leaves out of balance acts on it in the next lapse, or, once a mechanism has slid, is
+spread again. Base and sides hold the ground here as they would for a long time: a compliant base is
+fixed, dashpots and free fields are rollers; what they bear is none of the imbalance.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.fem import Function
+from petsc4py import PETSc
+from scipy import sparse
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.frequency import DynamicSystem, SymmetricFactorisation, constant
+from fenics_hytf.lapse.errors import BalanceError
+from fenics_hytf.lapse.filling import Filling
+from fenics_hytf.lapse.ground import Ground
+from fenics_hytf.lapse.material import elastic_constants
+from fenics_hytf.lapse.unknowns import Unknowns
+from fenics_hytf.operators import ElasticForm, InternalForce, isotropic_stress, strain_rows
+from fenics_hytf.particles import (
+    Points,
+    gradient_matrices,
+    resample_matrix,
+    transfer_matrix,
+)
+from fenics_hytf.scene import Scene
+
+RealArray = npt.NDArray[np.float64]
+
+BALANCE = 1e-9
+"""Of the weight: what may be out of balance before shaking."""
+
+_LEVEL = 1e-6  # shear over vertical stress, below which ground is level
+_STEPS = 40  # of spreading: points on Gauss points take one, others some ten
+
+
+def static_supports(supports: dict[str, str]) -> dict[str, str]:
+    """What holds each boundary in the long run.
+
+    Args:
+        supports: What holds it in a lapse.
+
+    Returns:
+        The kind of each boundary.
+    """
+    lasting = {"compliant": "fixed", "dashpot": "roller", "free_field": "roller"}
+    return {name: lasting.get(kind, kind) for name, kind in supports.items()}
+
+
+class Statics:
+    """Brings the stress of points into balance with their weight.
+
+    Args:
+        scene: The scene; it calls for gravity.
+        domain: The domain.
+    """
+
+    def __init__(self, scene: Scene, domain: Domain) -> None:
+        assert scene.effects.gravity is not None
+        self._scene, self._domain = scene, domain
+        self._gravity = scene.effects.gravity
+        self._elastic, self._force = ElasticForm(domain), InternalForce(domain)
+        self._supports = static_supports(scene.supports)
+        self._unknowns: Unknowns | None = None
+        self._K: PETSc.Mat | None = None
+        self._weight: RealArray | None = None
+
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+        for owned in (self._unknowns, self._K):
+            if owned is not None:
+                owned.destroy()
+
+    @property
+    def unknowns(self) -> Unknowns:
+        """Unknowns of ground that is held for a long time, borrowed until others are filled."""
+        if self._unknowns is None:
+            self._unknowns = Unknowns(self._domain, self._supports)
+        return self._unknowns
+
+    def occupy(self, filling: Filling, others: bool) -> None:
+        """Take note of which cells are filled, and how far (collective).
+
+        Args:
+            filling: The filling.
+            others: Whether other cells are filled than before.
+        """
+        if others and self._unknowns is not None:
+            self.destroy()
+            self._unknowns, self._K = None, None
+        if self._unknowns is None:
+            bare = filling.bare_nodes(self._domain)
+            self._unknowns = Unknowns(self._domain, self._supports, bare=bare)
+        self._weight = filling.weight[self._domain.input_cells]
+        self._force.weigh(self._weight)
+
+    def settle(self, points: Points, ground: Ground) -> None:
+        """Give points their first stress (collective).
+
+        Args:
+            points: Points without stress, changed in place.
+            ground: The ground.
+
+        Raises:
+            BalanceError: The stress does not come into balance.
+        """
+        self.spread(points, ground)
+        initial = self._gravity.initial_stress
+        if initial == "k0" or (initial is None and self._is_level(points)):
+            self._rest_on_k0(points)
+            self.spread(points, ground)
+
+    def _is_level(self, points: Points) -> bool:
+        """Whether the elastic stress has hardly any shear."""
+        stress = points["stress"]
+        up = points.x.shape[1] - 1
+        mine = [np.abs(stress[:, up + 1 :]).max(initial=0), np.abs(stress[:, up]).max(initial=0)]
+        shear, vertical = np.max(self._domain.comm.allgather(mine), axis=0)
+        return bool(shear <= _LEVEL * vertical)
+
+    def _rest_on_k0(self, points: Points) -> None:
+        up = points.x.shape[1] - 1
+        names = self._domain.region_names
+        k0 = np.array([self._scene.soil[name].at_rest for name in names])[points.region]
+        stress = np.zeros_like(points["stress"])
+        stress[:, up] = points["stress"][:, up]
+        stress[:, :up] = (k0 * stress[:, up])[:, None]
+        points["stress"] = stress
+
+    def spread(self, points: Points, ground: Ground, limit: float = BALANCE) -> None:
+        """Spread elastically what is out of balance (collective).
+
+        Args:
+            points: Points, their stress changed in place.
+            ground: The ground, whose small-strain stiffness spreads it.
+            limit: What may be left, of the weight [-].
+
+        Raises:
+            BalanceError: More is left.
+        """
+        domain, unknowns = self._domain, self.unknowns
+        lame, shear = elastic_constants(ground, self._scene.solver).at(domain.input_cells)
+        weight = 1.0 if self._weight is None else self._weight
+        with self._factorised(weight * lame, weight * shear) as factorisation:
+            R = self._resampling(points)
+            rows = strain_rows(gradient_matrices(points, domain.V), domain.num_components)
+            f_g = unknowns.collect(self.weight_of(points))
+            scale, left = f_g.norm(), np.inf
+            x = f_g.duplicate()
+            for _ in range(_STEPS):
+                residual = unknowns.collect(self._internal(points, R))
+                residual.aypx(-1.0, f_g)
+                before, left = left, residual.norm() / scale
+                if left > limit and left < before:
+                    factorisation.backsolve(residual, x)
+                    u = unknowns.expand(x.array_r.real)
+                    strain = (rows @ u.ravel()).reshape(len(points), -1)
+                    constants = lame[points.cell], shear[points.cell]
+                    points["stress"] = points["stress"] + isotropic_stress(strain, *constants)
+                residual.destroy()
+                if left <= limit or left >= before:
+                    break
+            for vector in (f_g, x):
+                vector.destroy()
+        if left > limit:
+            raise BalanceError(left, limit)
+
+    def _factorised(self, lame: RealArray, shear: RealArray) -> SymmetricFactorisation:
+        T = self.unknowns.T
+        nodal = self._elastic.create_matrix()
+        self._elastic.assemble(nodal, lame, shear)
+        self._K = nodal.ptap(T, result=self._K)
+        nodal.destroy()
+        factorisation = SymmetricFactorisation(DynamicSystem([(self._K, constant)], self._K))
+        factorisation.factorise(0.0)
+        return factorisation
+
+    def _resampling(self, points: Points) -> sparse.csr_matrix:
+        degree = self._domain.V.ufl_element().degree
+        return resample_matrix(self._domain.mesh, points, degree, self._force.sites)
+
+    def weight_of(self, points: Points) -> RealArray:
+        """Weight of the points at this rank's nodes [N, in 2D N/m].
+
+        Args:
+            points: The points.
+
+        Returns:
+            Ghosts included, components fastest, shape ``(num_local_nodes·num_components,)``.
+        """
+        g = np.zeros((len(points), self._domain.num_components))
+        g[:, -1] = -self._gravity.acceleration * points.mass
+        return np.asarray(transfer_matrix(points, self._domain.V).T @ g).ravel()
+
+    def _internal(self, points: Points, R: sparse.csr_matrix) -> RealArray:
+        return self._force(np.asarray(R @ points["stress"]))
+
+    def imbalance(self, points: Points) -> RealArray:
+        """What the stress leaves of the weight where the ground may move (collective).
+
+        Args:
+            points: The points.
+
+        Returns:
+            This rank's share at its nodes, to be summed over ranks, ghosts included, components
+            fastest [N, in 2D N/m].
+        """
+        free = Function(self._domain.V)
+        rows, ones = self.unknowns.T.createVecLeft(), self.unknowns.T.createVecRight()
+        ones.set(1.0)
+        self.unknowns.T.mult(ones, rows)
+        free.x.array[: rows.getLocalSize()] = rows.array_r
+        free.x.scatter_forward()
+        rows.destroy()
+        ones.destroy()
+        left = self.weight_of(points) - self._internal(points, self._resampling(points))
+        return left * free.x.array.real

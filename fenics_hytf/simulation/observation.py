@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: MIT
+"""What is seen of a lapse: receivers, the base, and the middle of every cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.lapse import (
+    BaseProbe,
+    CellProbe,
+    CellState,
+    Continuity,
+    Equations,
+    Ground,
+    Histories,
+    ReceiverProbe,
+    Response,
+    Solved,
+    Spectra,
+    outcrop_motion,
+    within_motion,
+)
+from fenics_hytf.particles import Points
+from fenics_hytf.scene import Scene
+from fenics_hytf.simulation.receivers import Receivers
+
+RealArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What is seen of a lapse.
+
+    Attributes:
+        histories: Of the receivers, their displacement since the start of the record.
+        within: Acceleration of the base in the direction of each motion [m/s^2].
+        outcrop: Of the bare rock likewise, or ``None``.
+        cells: State of the cells.
+    """
+
+    histories: Histories
+    within: RealArray
+    outcrop: RealArray | None
+    cells: CellState
+
+
+class Observation:
+    """Looks at lapses, and keeps what receivers and base have moved by in those before.
+
+    Args:
+        scene: The scene.
+        domain: The domain.
+        equations: Its equations.
+        continuity: How lapses hang together.
+        points: The points, which receivers may ride.
+
+    Attributes:
+        receivers: The receivers.
+        probe: Evaluates the response in the cells.
+        carried: Displacement of the receivers relative to the base at the start of a lapse [m],
+            shape ``(num_receivers, num_components)``.
+        base_carried: That of the base [m], shape ``(num_components,)``.
+        base_before: That at the start of the lapse last seen.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        domain: Domain,
+        equations: Equations,
+        continuity: Continuity,
+        points: Points,
+    ) -> None:
+        self._scene, self._domain = scene, domain
+        self._equations, self._continuity = equations, continuity
+        self.receivers = Receivers(domain, points, scene.output.receivers)
+        components = domain.num_components
+        self.carried = np.zeros((len(self.receivers.names), components))
+        self.base_carried = np.zeros(components)
+        self.base_before = self.base_carried
+        self.probe: CellProbe
+        self._base: BaseProbe | None = None
+
+    def look_at(self, filled: npt.NDArray[np.bool_] | None) -> None:
+        """Make what evaluates the unknowns, once they are known or have become others.
+
+        Args:
+            filled: Cells with soil in the order of the input, all if ``None``.
+        """
+        self.destroy()
+        loop = self._scene.effects.equivalent_linear
+        convention = loop.strain if loop is not None else "plane"
+        self.probe = CellProbe(self._domain, self._equations.T, convention, filled)
+        self._base = BaseProbe(self._domain, self._equations)
+
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+        if self._base is not None:
+            self._base.destroy()
+            self.probe.destroy()
+
+    def base_at(self, unknowns: RealArray) -> RealArray:
+        """Mean displacement of the base; see :meth:`~fenics_hytf.lapse.BaseProbe.at`."""
+        assert self._base is not None
+        return self._base.at(unknowns)
+
+    def see(self, solved: Solved, ground: Ground, points: Points) -> Seen:
+        """Look at a lapse, and go on from its end (collective).
+
+        Args:
+            solved: The lapse.
+            ground: The ground in it.
+            points: The points at its start.
+
+        Returns:
+            What is seen.
+        """
+        assert self._base is not None
+        excitation, response = solved.excitation, solved.response
+        base = self._base.motion(response)
+        histories, moved = self._at_receivers(response, base, points)
+        cells = self._cell_state(solved, ground, base)
+        outcrop = outcrop_motion(self._scene, self._domain, self._equations, response)
+        displacement = histories.displacement + self.carried[:, :, None]
+        if self._continuity.goes_on_from_nought:
+            at_end = self._base.at(response.unknowns_at(excitation.duration))
+            self.carried = self.carried + moved - at_end
+            self.base_before = self.base_carried
+            self.base_carried = self.base_carried + at_end
+        return Seen(
+            replace(histories, displacement=displacement),
+            within_motion(response, base),
+            outcrop,
+            cells,
+        )
+
+    def _at_receivers(
+        self, response: Response, base: Spectra, points: Points
+    ) -> tuple[Histories, RealArray]:
+        """Their histories, and what the lapse has moved them by at its end."""
+        sites, numbers = self.receivers.sites(points)
+        count = len(self.receivers.names)
+        probe = ReceiverProbe(self._domain, self._equations.T, sites, numbers, count)
+        try:
+            end = response.excitation.duration
+            return probe.histories(response, base), probe.at(response.unknowns_at(end))
+        finally:
+            probe.destroy()
+
+    def _cell_state(self, solved: Solved, ground: Ground, base: Spectra) -> CellState:
+        moduli = solved.moduli
+        carried = self._continuity.carried(solved.material)
+        if carried is not None:
+            relative = carried.displacement - self.base_carried
+            carried = replace(carried, displacement=relative)
+        peaks = self.probe.peaks(solved.response, solved.material, base, carried)
+        change = solved.loop.last
+        effective = solved.effective_strain
+        return CellState(
+            region=ground.region,
+            centroid=self._domain.centroids(),
+            shear_modulus=moduli.shear_modulus,
+            g_over_gmax=moduli.shear_modulus / ground.shear_modulus,
+            damping=moduli.damping,
+            effective_strain=peaks.strain if effective is None else effective,
+            peak_strain=peaks.strain,
+            peak_stress=peaks.stress,
+            peak_acceleration=peaks.acceleration,
+            peak_velocity=peaks.velocity,
+            peak_displacement=peaks.displacement,
+            change=np.zeros(len(ground.region)) if change is None else change,
+            degradation=ground.degradation,
+            fill=None if ground.filling is None else ground.filling.share,
+        )
