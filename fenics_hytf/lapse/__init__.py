@@ -25,11 +25,14 @@ from fenics_hytf.lapse.free_field import FreeField, FreeFieldState, column_suppo
 from fenics_hytf.lapse.ground import Ground, Moduli, seed_points, survey
 from fenics_hytf.lapse.handover import Handover
 from fenics_hytf.lapse.material import ElasticConstants, Material, Part, material
+from fenics_hytf.lapse.mechanism import Mechanism, MechanismError, MechanismSearch
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
-from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
+from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory, SlipResult
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
 from fenics_hytf.lapse.run import Observer, Solved, solve
 from fenics_hytf.lapse.scheme import Scheme, scheme_of
+from fenics_hytf.lapse.sliding import Sliding
+from fenics_hytf.lapse.slipped import Slipped, SlipState
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.lapse.whole_record import WholeRecord
@@ -64,12 +67,19 @@ __all__ = [
     "LapseResult",
     "LoopHistory",
     "Material",
+    "Mechanism",
+    "MechanismError",
+    "MechanismSearch",
     "Moduli",
     "Observer",
     "Part",
     "ReceiverProbe",
     "Response",
     "Scheme",
+    "Sliding",
+    "SlipResult",
+    "SlipState",
+    "Slipped",
     "Solved",
     "Spectra",
     "Statics",

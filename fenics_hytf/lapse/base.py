@@ -57,9 +57,7 @@ class BaseProbe:
         if self._rows is None:
             shape = (self._domain.num_components, len(response.excitation.lines))
             return Spectra(np.zeros(shape, complex))
-        mine, comm = response.spectra(self._rows), self._domain.comm
-        start = None if mine.start is None else comm.allreduce(mine.start)
-        return Spectra(np.asarray(comm.allreduce(mine.coefficients)), start)
+        return response.spectra(self._rows).summed(self._domain.comm)
 
     def at(self, unknowns: RealArray) -> RealArray:
         """Mean displacement of the base at one instant (collective).

@@ -17,6 +17,7 @@ from fenics_hytf.frequency import share
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.response import Response, Spectra
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.operators import constrained_rows, displacement_rows, split_rows, strain_rows
 from fenics_hytf.particles import cell_centres, gradient_matrices, transfer_matrix
 
@@ -161,12 +162,33 @@ class CellProbe:
             peak[some, 0] = peak_shear_strain(strain, self._convention)
         return self._gather(peak)[:, 0]
 
+    def shear_strain(self, unknowns: RealArray) -> RealArray:
+        """Shear strain of a field at one instant (collective).
+
+        Args:
+            unknowns: This rank's, shape ``(num_local_unknowns,)``.
+
+        Returns:
+            All cells in the order of the input [-], shape ``(num_cells,)``.
+        """
+        found = np.zeros((self._domain.num_owned_cells, 1))
+        for cells, rows, _ in self._blocks:
+            x, seen = rows.createVecs()
+            x.array[:] = unknowns
+            rows.mult(x, seen)
+            strain = _by_cell(seen.array_r.real, cells)[:, :, None]
+            found[cells, 0] = peak_shear_strain(strain, self._convention)
+            x.destroy()
+            seen.destroy()
+        return self._gather(found)[:, 0]
+
     def peaks(
         self,
         response: Response,
         material: Material,
         base: Spectra,
         carried: CarriedCells | None = None,
+        slip: Slipped | None = None,
     ) -> CellPeaks:
         """Largest strain, stress and motion of every cell (collective).
 
@@ -175,6 +197,7 @@ class CellProbe:
             material: The law of every cell.
             base: Motion of the base, which relative motion is relative to.
             carried: What the lapse began with.
+            slip: What slips besides; it strains nothing that bears stress.
 
         Returns:
             The peaks.
@@ -190,15 +213,19 @@ class CellProbe:
                 strain = self._strain(response, spectra, some, carried)
                 for column, history in enumerate((strain, stress(spectra, some))):
                     peak[some, column] = peak_shear_strain(history, self._convention)
+            moved = None if slip is None else _by_cell(slip.seen_by(places), cells)
             for some, u in _by_few(cells, weighed(places)):
-                acceleration = response.history(u, 2)
+                histories = [response.history(v, d) for d, v in enumerate((u - base, u - base, u))]
+                if slip is not None and moved is not None:
+                    for derivative, history in enumerate(histories):
+                        there = moved[some.start - cells.start : some.stop - cells.start]
+                        history += there[:, :, None] * slip.at_samples(derivative)
+                displacement, velocity, acceleration = histories
                 acceleration += motion.astype(acceleration.dtype)
-                peak[some, 2] = peak_length(acceleration)
-                relative = u - base
-                peak[some, 3] = peak_length(response.history(relative, 1))
-                displacement = response.history(relative)
                 if carried is not None:
                     displacement += carried.displacement[some, :, None].astype(displacement.dtype)
+                peak[some, 2] = peak_length(acceleration)
+                peak[some, 3] = peak_length(velocity)
                 peak[some, 4] = peak_length(displacement)
         return CellPeaks(*self._gather(peak).T)
 
@@ -240,6 +267,12 @@ class _StressHistories:
             shares, fading = self._carried.stress[some], self._carried.fading
             history += shares.astype(history.dtype) @ fading.astype(history.dtype)
         return history
+
+
+def _by_cell(values: RealArray, cells: slice) -> RealArray:
+    """Values of the rows of a block, shape ``(num_cells, num_values)``."""
+    count = max(cells.stop - cells.start, 1)
+    return values.reshape(-1, len(values) // count) if len(values) else np.empty((0, 1))
 
 
 def _by_few(cells: slice, spectra: Spectra) -> Iterator[tuple[slice, Spectra]]:

@@ -41,6 +41,7 @@ def convect(
     velocity: RealArray | None = None,
     acceleration: RealArray | None = None,
     density: RealArray | None = None,
+    slip: RealArray | None = None,
 ) -> MoveReport:
     """Move the points with the nodes' increment and find them again (collective).
 
@@ -56,6 +57,7 @@ def convect(
         velocity: At the nodes at the end of the lapse [m/s], for points that carry it.
         acceleration: Likewise [m/s^2].
         density: Of each region when it was seeded [kg/m^3], to know a point's volume then.
+        slip: Plastic part λφ of the increment, likewise; it turns stress and adds none.
 
     Returns:
         The mass ledger, and how many points were mapped.
@@ -69,20 +71,22 @@ def convect(
     """
     before = points.arrays() | {name: old.copy() for name, old in points.history.items()}
     S = transfer_matrix(points, domain.V)
-    gradient = np.stack([dS @ increment for dS in gradient_matrices(points, domain.V)], axis=2)
+    gradients = gradient_matrices(points, domain.V)
+    gradient = np.stack([dS @ increment for dS in gradients], axis=2)
+    plastic = None if slip is None else np.stack([dS @ slip for dS in gradients], axis=2)
     for name, field in (("velocity", velocity), ("acceleration", acceleration)):
         if field is not None and name in points.history:
             points[name] = S @ field
-    moduli = {"lame_lambda": 0.0, "shear_modulus": 0.0}
+    moduli: dict[str, npt.ArrayLike] = {"lame_lambda": 0.0, "shear_modulus": 0.0}
     if constants is not None and "dynamic_stress" not in points.history:
         cells = domain.input_cells[points.cell]
         moduli = {
             "lame_lambda": constants.lame_lambda[cells],
             "shear_modulus": constants.shear_modulus[cells],
         }
-    displacement = S @ increment
+    displacement = S @ (increment if slip is None else increment + slip)
     if np.isfinite(gradient).all():
-        update_kinematics(points, gradient, **moduli)
+        update_kinematics(points, gradient, **moduli, plastic=plastic)
     try:
         if density is not None:
             _require_volume(domain, points, density)

@@ -75,14 +75,20 @@ class LapseEquations:
         system: A(s) of the lapse.
         loads: −TᵀM r of each motion [kg, in 2D kg/m], with what comes from beyond the sides.
         viscous: What is multiplied by the velocity: C and the dashpots of a base.
+        drag: Matrices and factors of that which resists a mechanism as well, dashpots and αM: where
+            it slips βK, like K, feels the elastic strain alone.
         stiff: What is multiplied by the displacement, parts of the law first and in their order,
             and the share of each that a sudden displacement meets.
+        lasting: The same with the shares that hold in the long run, where the modulus is G; and the
+            springs that the rock below a compliant base is at rest.
     """
 
     system: DynamicSystem
     loads: list[PETSc.Vec] | Loads
     viscous: list[PETSc.Mat]
+    drag: list[tuple[PETSc.Mat, float]]
     stiff: list[tuple[PETSc.Mat, float]]
+    lasting: list[tuple[PETSc.Mat, float]]
 
 
 class Equations:
@@ -105,7 +111,7 @@ class Equations:
         self._domain = domain
         self._scene = scene
         self._assemblies = assemblies
-        self._elastic = ElasticForm(domain)
+        self._elastic = ElasticForm(domain, scene.effects.locking)
         self._geometric = GeometricForm(domain) if scene.effects.geometric_stiffness else None
         self.axes = tuple(domain.components.index(m.direction) for m in scene.motion)
         supports = scene.supports
@@ -139,6 +145,11 @@ class Equations:
     def T(self) -> PETSc.Mat:
         """Constraint matrix, borrowed until other cells are filled."""
         return self.unknowns.T
+
+    @property
+    def mass(self) -> PETSc.Mat:
+        """TᵀMT [kg], borrowed until the points are weighed again."""
+        return self._constrained["mass"]
 
     @property
     def num_unknowns(self) -> int:
@@ -302,14 +313,16 @@ class Equations:
         parts = [(self._stiffness(p.name, p.constants), p) for p in material.parts]
         terms = [(matrix, part.function) for matrix, part in parts]
         stiff = [(matrix, part.instantaneous) for matrix, part in parts]
+        lasting = [(matrix, self.share_at_reference(part)) for matrix, part in parts]
+        elastic = []
         if "geometric" in self._constrained:
-            geometric = self._constrained["geometric"]
-            terms.append((geometric, constant))
-            stiff.append((geometric, 1.0))
+            elastic.append(self._constrained["geometric"])
         if self._ghost is not None:
-            ghost = self._hold_edges(self._ghost, material.real)
-            terms.append((ghost, constant))
-            stiff.append((ghost, 1.0))
+            elastic.append(self._hold_edges(self._ghost, material.real))
+        terms += [(matrix, constant) for matrix in elastic]
+        stiff += [(matrix, 1.0) for matrix in elastic]
+        lasting += [(matrix, 1.0) for matrix in elastic]
+        lasting += [(matrix, float(np.real(function(0.0)))) for matrix, function in self._radiating]
         terms += self._radiating
         damping = self._damping(parts, ground, material.real)
         system = DynamicSystem(terms, self._constrained["mass"], damping)
@@ -317,7 +330,9 @@ class Equations:
             system,
             self.with_sides(self._inertia),
             [matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
+            self._drag(),
             stiff,
+            lasting,
         )
 
     def _hold_edges(self, form: GhostForm, constants: ElasticConstants) -> PETSc.Mat:
@@ -327,6 +342,15 @@ class Equations:
         form.assemble(self._K, modulus[self._domain.input_cells])
         self._assemblies["ghost"] += 1
         return self._constrain("ghost", self._K)
+
+    def _drag(self) -> list[tuple[PETSc.Mat, float]]:
+        drag = [(matrix, 1.0) for matrix, _ in self._radiating]
+        if self._dashpots is not None:
+            drag.append((self._constrained["dashpot"], 1.0))
+        rayleigh = self._scene.effects.rayleigh
+        if rayleigh is not None and rayleigh.alpha:
+            drag.append((self._constrained["mass"], rayleigh.alpha))
+        return drag
 
     def _damping(
         self, parts: list[tuple[PETSc.Mat, Part]], ground: Ground, constants: ElasticConstants
@@ -350,8 +374,8 @@ class Equations:
             return C
         lame, shear = constants.at(self._domain.input_cells)
         density = ground.density[self._domain.input_cells]
-        impedance = np.sqrt(density * (lame + 2 * shear)), np.sqrt(density * shear)
-        self._dashpots.assemble(self._K, *self._weighted(*impedance))
+        impedance = self._weighted(np.sqrt(density * (lame + 2 * shear)), np.sqrt(density * shear))
+        self._dashpots.assemble(self._K, *impedance)
         self._assemblies["dashpot"] += 1
         for side in self._side_forces:
             side.fasten(*impedance)

@@ -8,7 +8,7 @@ and every line up to the maximum frequency counts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -146,6 +146,34 @@ class Excitation:
         """e^{ηt} of the samples."""
         time = self.dt * np.arange(self.num_samples)
         return np.exp(self.eta * time) if self.eta else None
+
+    def shortened(self, num_samples: int) -> Excitation:
+        """The input of a lapse that ends sooner; the response in it is the same.
+
+        Args:
+            num_samples: Samples of it, not more than there are.
+
+        Returns:
+            The input.
+        """
+        given = None if self.given is None else self.given[:, :num_samples]
+        return replace(self, num_samples=num_samples, given=given)
+
+    def between(self, coefficients: ComplexArray, substeps: int) -> RealArray:
+        """Sum the lines at every sample, between samples, and at the end of the lapse.
+
+        Args:
+            coefficients: Shape ``(..., num_lines)``.
+            substeps: Steps from one sample to the next.
+
+        Returns:
+            Shape ``(..., num_samples·substeps + 1)``.
+        """
+        longer = replace(self, num_samples=self.num_samples + 1)
+        shifts = self.dt / substeps * np.arange(substeps)
+        parts = [longer.to_time(coefficients * np.exp(self.s * shift)) for shift in shifts]
+        flat = np.stack(parts, axis=-1).reshape(*coefficients.shape[:-1], -1)
+        return flat[..., : self.num_samples * substeps + 1]
 
     def to_time(self, coefficients: ComplexArray) -> RealArray:
         """Sum the lines at every sample.

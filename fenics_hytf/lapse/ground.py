@@ -121,11 +121,14 @@ def seed_points(
         fields += ["velocity", "acceleration", "strain"]
     if scene.effects.geometric_stiffness or scene.effects.gravity is not None:
         fields += ["stress"]
+    vectors: dict[str, tuple[int, ...]] = {}
+    if scene.effects.sliding is not None:
+        vectors = {"mechanism": (domain.num_components,), "plastic_strain": (), "shear_strain": ()}
     density = [scene.soil[name].density for name in domain.region_names]
     count = scene.mesh.points_in(domain.mesh.topology.cell_name())
     regions = np.where(domain.regions < 0, len(density), domain.regions).astype(np.int32)
     points = seed(domain.mesh, regions, [*density, 0.0], count, fields)
-    for name, shape in carried.items():
+    for name, shape in (*vectors.items(), *carried.items()):
         if name not in points.history:
             points.add(name, shape)
     return points

@@ -44,11 +44,10 @@ from fenics_hytf.motion import (
     StartFunctions,
     band_limited,
 )
-from fenics_hytf.operators import InternalForce, isotropic_stress, strain_rows
+from fenics_hytf.operators import InternalForce, isotropic_stress
 from fenics_hytf.particles import (
     Points,
     cell_centres,
-    gradient_matrices,
     resample_matrix,
     transfer_matrix,
 )
@@ -82,14 +81,15 @@ class Handover:
     ) -> None:
         self._scene, self._domain, self._equations = scene, domain, equations
         motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
-        self._record = LapseRecord(motion, scene.dt)
+        after = scene.rest_samples + scene.segments[0].num_samples if scene.rest_samples else 0
+        self._record = LapseRecord(np.pad(motion, ((0, 0), (0, after))), scene.dt)
         assert scheme.contour is not None
         self._contour = scheme.contour
         rates = (*(1 / tau for tau in RELAXATION_TIMES), 1 / FADING)
         limit = scene.solver.max_frequency
         self._start = StartFunctions.fading_in(self._contour, limit, rates)
         self.fields = scheme.carried(domain.num_components)
-        self._force = InternalForce(domain)
+        self._force = InternalForce(domain, scene.effects.locking)
         self._centres = cell_centres(domain.mesh, 0, domain.num_owned_cells)
         self._resampling: list[sparse.csr_matrix] = []
         self._excitation: Excitation
@@ -99,6 +99,9 @@ class Handover:
         self._momentum: PETSc.Vec | None = None
         self._statics = statics if scene.effects.convection else None
         self._imbalance: PETSc.Vec | None = None
+        # φ on the unknowns, and the rate at which a mechanism slips as the lapse begins: its
+        # dashpots pull at the ground, −Cφ λ̇₀/s.
+        self.steady_slip: tuple[RealArray, float] | None = None
         self._solved: LapseEquations
 
     def excite(self, segment: Segment) -> Excitation:
@@ -134,15 +137,30 @@ class Handover:
     def respond(self, solve: Solve, equations: LapseEquations, material: Material) -> Response:
         """The increment of the lapse, and its start."""
         self._solved = equations
+        self._constant = self._constant_force(equations)
         forces = self._forces(material)
         if self._excitation.carries:
             sweep = solve(self._equations.with_sides(self._loads(material, forces)))
         else:
             sweep = solve(equations.loads)
         start = self._starts(equations, material, forces)
-        for force in forces:
+        for force in [*forces, *([] if self._constant is None else [self._constant])]:
             force.destroy()
         return Response(sweep, self._excitation, start, start_factorisations=1)
+
+    def _constant_force(self, equations: LapseEquations) -> PETSc.Vec | None:
+        """What acts throughout the lapse, or ``None`` if nothing does."""
+        force = None if self._imbalance is None else self._imbalance.copy()
+        if self.steady_slip is not None and self.steady_slip[1] and equations.drag:
+            phi, rate = self.steady_slip
+            assert self._momentum is not None
+            factors = [(C, -rate * factor) for C, factor in equations.drag]
+            drag = product(factors, phi, like=self._momentum)
+            if force is None:
+                return drag
+            force.axpy(1.0, drag)
+            drag.destroy()
+        return force
 
     def _forces(self, material: Material) -> list[PETSc.Vec]:
         """Forces of what is carried: f of each part of the law, and f_q."""
@@ -162,9 +180,9 @@ class Handover:
         fades = [-fading(part.relaxation_time, s) for part in material.parts]
         carried = [np.ones_like(s), *fades, -fading(FADING, s)]
         vectors = [self._momentum, *forces]
-        if self._imbalance is not None:
+        if self._constant is not None:
             carried.append(fading(None, s))
-            vectors.append(self._imbalance)
+            vectors.append(self._constant)
         num_motions = len(inertia)
         shape = (num_motions + len(carried), num_motions + 1, len(s))
         coefficients = np.zeros(shape, np.complex128)
@@ -185,14 +203,42 @@ class Handover:
         ones, stiff = [1.0] * len(forces), equations.stiff
         force = self._start_force(0, motion[0], forces, ones, [(viscous, v)])
         rate = self._start_force(1, motion[1], forces, rates, [(stiff, v)])
+        columns = self._columns(equations, v, force, rate)
+        for vector in (force, rate):
+            vector.destroy()
+        return columns
+
+    def start_from(self, force: PETSc.Vec, rate: PETSc.Vec) -> Columns:
+        """Coefficients of the start functions under a force that is there at once (collective).
+
+        Args:
+            force: The force.
+            rate: Its rate but for the viscous forces that the acceleration brings.
+
+        Returns:
+            The coefficients, from rest.
+        """
+        return self._columns(self._solved, 0 * force.array_r.real, force, rate)
+
+    def _columns(
+        self, equations: LapseEquations, velocity: RealArray, force: PETSc.Vec, rate: PETSc.Vec
+    ) -> Columns:
+        viscous = [(C, 1.0) for C in equations.viscous]
         with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
             a = accelerate(force, rate)
             slowed = product(viscous, a, like=rate)
-            rate.axpy(-1.0, slowed)
-            j = accelerate(rate)
-        for vector in (force, rate, slowed):
-            vector.destroy()
-        return start_columns(self._start, [0 * v, v, a, j])
+            slowed.aypx(-1.0, rate)
+            j = accelerate(slowed)
+        slowed.destroy()
+        return start_columns(self._start, [0 * velocity, velocity, a, j])
+
+    @property
+    def motion_to_end(self) -> RealArray:
+        """Base acceleration at the samples of the lapse and the one after them [m/s^2].
+
+        Shape ``(num_motions, num_samples + 1)``.
+        """
+        return self._record.samples[:, self._segment.start : self._segment.stop + 1]
 
     def _start_force(
         self,
@@ -206,8 +252,8 @@ class Handover:
         total = forces[0].duplicate()
         total.zeroEntries()
         self._equations.add_side_start(derivative, total)
-        if self._imbalance is not None and derivative == 0:
-            total.axpy(1.0, self._imbalance)
+        if self._constant is not None and derivative == 0:
+            total.axpy(1.0, self._constant)
         for inertia, value in zip(self._equations.inertia, motion, strict=True):
             total.axpy(float(value), inertia)
         for force, factor in zip(forces, factors, strict=True):
@@ -333,7 +379,7 @@ class Handover:
             return self._equations.unknowns.expand(unknowns)
 
         S = transfer_matrix(points, V)
-        B = strain_rows(gradient_matrices(points, V), self._domain.num_components)
+        B = self._force.strain_rows(points)
         cells = self._domain.input_cells[points.cell]
         # What is left of the rest of stress that the lapse began with.
         stress = points["dynamic_stress"] - stress_of(State.of(points), material, cells)

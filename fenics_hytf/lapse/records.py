@@ -75,6 +75,50 @@ class LoopHistory:
 
 
 @dataclass(frozen=True)
+class SlipResult:
+    """What slipped in a lapse.
+
+    Attributes:
+        yield_coefficient: k_y [-].
+        factor_of_safety: At rest, before shaking [-].
+        direction: Component in which the mechanism is driven.
+        sense: Of the motion that drives it along that, 1 or -1.
+        time_step: Of the march [s].
+        slip: λ from the start of the lapse to its end [m], shape ``(num_steps,)``.
+        rate: λ̇ [m/s], likewise.
+        driving: Acceleration of the linear response that drives the mechanism [m/s^2], likewise.
+        rigid: Slip of Newmark's rigid block in the lapse [m].
+        decoupled: Slip of a rigid block under ``driving`` [m].
+        mass: φᵀM r, what the mechanism carries [kg, in 2D kg/m].
+        modal_mass: φᵀMφ [kg, in 2D kg/m].
+        dissipation: ∫τ_f γ(φ) dV, what a metre of slip costs [N, in 2D N/m].
+        shear_strain: γ(φ) in the middle of every cell [1/m], shape ``(num_cells,)``.
+        iterations: Flows that the search for the mechanism took.
+    """
+
+    yield_coefficient: float
+    factor_of_safety: float
+    direction: str
+    sense: int
+    time_step: float
+    slip: RealArray
+    rate: RealArray
+    driving: RealArray
+    rigid: float
+    decoupled: float
+    mass: float
+    modal_mass: float
+    dissipation: float
+    shear_strain: RealArray
+    iterations: int
+
+    @property
+    def slid(self) -> bool:
+        """Whether there was any slip."""
+        return bool(self.slip[-1] > 0)
+
+
+@dataclass(frozen=True)
 class LapseResult:
     """One lapse.
 
@@ -106,6 +150,7 @@ class LapseResult:
             cells [-]; ``None`` where nothing was handed over.
         energy: Energy ledger, or ``None`` under ``steady`` continuity or a law that is not causal.
         ledger: Points and their mass after the lapse's convective phase.
+        slip: What slipped, or ``None`` where the scene does not call for sliding.
     """
 
     index: int
@@ -130,3 +175,4 @@ class LapseResult:
     seam_error: float | None
     energy: Energy | None
     ledger: MassLedger
+    slip: SlipResult | None = None

@@ -16,12 +16,14 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import Columns, Sweep
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Part
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.operators import constrained_rows, displacement_rows
 from fenics_hytf.particles import Sites, transfer_matrix
 
@@ -53,6 +55,11 @@ class Spectra:
     def __getitem__(self, some: slice | list[int]) -> Spectra:
         """Some of the quantities."""
         return Spectra(self.coefficients[some], None if self.start is None else self.start[some])
+
+    def summed(self, comm: MPI.Comm) -> Spectra:
+        """The sum over the ranks of a communicator (collective)."""
+        start = None if self.start is None else np.asarray(comm.allreduce(self.start))
+        return Spectra(np.asarray(comm.allreduce(self.coefficients)), start)
 
     def reshape(self, *shape: int) -> Spectra:
         """The quantities in another shape."""
@@ -122,6 +129,24 @@ class Response:
         if spectra.start is not None and given.start is not None:
             functions = given.start.in_time(given.num_samples, derivative)
             history += spectra.start.astype(history.dtype) @ functions.astype(history.dtype)
+        return history
+
+    def between(self, spectra: Spectra, derivative: int, substeps: int) -> RealArray:
+        """Values at every sample of the lapse, between samples, and at its end.
+
+        Args:
+            spectra: Of quantities, in double precision.
+            derivative: Order of the time derivative.
+            substeps: Steps from one sample to the next.
+
+        Returns:
+            Shape ``(..., num_samples·substeps + 1)``.
+        """
+        given = self.excitation
+        history = given.between(spectra.coefficients * given.s**derivative, substeps)
+        if spectra.start is not None and given.start is not None:
+            time = given.dt / substeps * np.arange(history.shape[-1], dtype=np.float64)
+            history = history + spectra.start @ given.start.at(time, derivative)
         return history
 
     def start_through(self, parts: tuple[Part, ...]) -> RealArray:
@@ -207,13 +232,16 @@ class ReceiverProbe:
         """Destroy the rows."""
         self._rows.destroy()
 
-    def histories(self, response: Response, base: Spectra) -> Histories:
+    def histories(
+        self, response: Response, base: Spectra, slip: Slipped | None = None
+    ) -> Histories:
         """Histories and transfer functions of all receivers, on every rank (collective).
 
         Args:
             response: The response.
             base: Motion of the base, which relative motion is relative to, a spectrum for each
                 component.
+            slip: What slips besides.
 
         Returns:
             The histories; the displacement is the increment of the lapse.
@@ -229,6 +257,10 @@ class ReceiverProbe:
         total = response.history(absolute, 2)
         total[:, list(given.axes)] += given.base_acceleration
         moved = [response.history(relative, derivative) for derivative in range(3)]
+        if slip is not None:
+            for derivative, history in enumerate(moved):
+                history += slip.added_to(self._rows, derivative).reshape(history.shape)
+            total += slip.added_to(self._rows, 2).reshape(total.shape)
         return Histories(*self._gather(transfer, *moved, total))
 
     def at(self, unknowns: RealArray) -> RealArray:

@@ -11,19 +11,31 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fenics_hytf.frequency import DynamicSystem, Loads, Sweep, direct_sweep, reduced_sweep
+from fenics_hytf.frequency import (
+    AffineLoads,
+    DynamicSystem,
+    Loads,
+    Sweep,
+    direct_sweep,
+    negative_eigenvalues,
+    reduced_sweep,
+)
 from fenics_hytf.lapse.cells import CellProbe
 from fenics_hytf.lapse.continuity import Continuity
-from fenics_hytf.lapse.equations import Equations
+from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import iterate
+from fenics_hytf.lapse.errors import GeometricInstability
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.ground import Ground, Moduli
 from fenics_hytf.lapse.material import Material, material
 from fenics_hytf.lapse.records import LoopHistory
 from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.sliding import Sliding
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
 
 _LOOSEST = 1e-2  # residual of a sweep that only tells the loop where to go
 # Directions a factorisation is used for: it costs 6 to 8 solves in sections, some 40 in solids.
@@ -70,6 +82,7 @@ class Solved:
         effective_strain: Of every cell [-], or ``None`` without the equivalent-linear loop.
         loop: History of the loop.
         tally: Factorisations and solves.
+        slip: What slipped, where the scene calls for sliding.
     """
 
     response: Response
@@ -78,6 +91,7 @@ class Solved:
     effective_strain: RealArray | None
     loop: LoopHistory
     tally: Tally = field(default_factory=Tally)
+    slip: Slipped | None = None
 
     @property
     def excitation(self) -> Excitation:
@@ -95,8 +109,12 @@ def solve(
     start: RealArray,
     observer: Observer,
     strain_from: npt.NDArray[np.intp] | None = None,
+    sliding: Sliding | None = None,
 ) -> Solved:
-    """Solve a lapse: one sweep, or the equivalent-linear loop round it.
+    """Solve a lapse: one sweep, or the equivalent-linear loop round it; then what slips.
+
+    The moduli are those of the response without slip: what yields is not to make the ground round
+    it softer as well.
 
     Args:
         scene: The scene.
@@ -108,6 +126,7 @@ def solve(
         start: First effective strain of every cell [-], shape ``(num_cells,)``.
         observer: Where to report.
         strain_from: See :func:`iterate`.
+        sliding: Has found the mechanism of the lapse, where the scene calls for one.
 
     Returns:
         The solution.
@@ -115,6 +134,7 @@ def solve(
     Raises:
         SweepError: A line cannot be solved.
         EquivalentLinearError: The loop reaches its limit.
+        GeometricInstability: The ground buckles under its weight.
     """
     sweeps = _Sweeps(scene, equations, ground, excitation, continuity, observer)
 
@@ -140,7 +160,12 @@ def solve(
             sweeps.solve(moduli, len(loop.change))
     assert sweeps.last is not None
     response, law = sweeps.last
-    return Solved(response, moduli, law, effective, loop, sweeps.tally)
+    if scene.effects.geometric_stiffness and scene.effects.gravity is not None:
+        sweeps.require_stability()
+    slip = None
+    if sliding is not None:
+        response, slip = sliding.slip(response, sweeps.equations, sweeps.again, sweeps.kernel)
+    return Solved(response, moduli, law, effective, loop, sweeps.tally, slip)
 
 
 class _Sweeps:
@@ -169,6 +194,9 @@ class _Sweeps:
         self.finest = max(self._growth * self.finest, min(self.finest, _IN_REACH))
         self.tolerance = self.finest
         self.last: tuple[Response, Material] | None = None
+        self.equations: LapseEquations
+        wider = _WIDER if equations.across.size > 1 else 1
+        self._block = round(_BLOCK[equations.gdim] * wider)
 
     def iterated(self, iteration: int, change: float) -> None:
         """Take note of the change of an iteration, and pass it on."""
@@ -196,7 +224,7 @@ class _Sweeps:
         """
         with self._observer.phase("assembly"):
             law = material(self._ground, moduli, self._solver)
-            lapse = self._equations.assemble(self._ground, law)
+            lapse = self.equations = self._equations.assemble(self._ground, law)
 
         def sweep(loads: Sequence[PETSc.Vec] | Loads) -> Sweep:
             return self._sweep(lapse.system, loads, iteration, tolerance)
@@ -205,6 +233,34 @@ class _Sweeps:
             self.last = self._continuity.respond(sweep, lapse, law), law
         self.tally.factorisations += self.last[0].start_factorisations
         return self.last
+
+    def require_stability(self) -> None:
+        """See that the ground does not buckle under its weight, as its moduli are now (collective).
+
+        Raises:
+            GeometricInstability: The stiffness is not definite; on every rank.
+        """
+        with self._observer.phase("sweep"):
+            negative = negative_eigenvalues(self.equations.lasting)
+        self.tally.factorisations += 1
+        if negative:
+            raise GeometricInstability(negative)
+
+    def again(self, loads: Sequence[PETSc.Vec] | Loads) -> Sweep:
+        """Sweep the equations of the last solution for other right-hand sides."""
+        with self._observer.phase("sweep"):
+            return self._sweep(self.equations.system, loads, 0, None)
+
+    def kernel(self, loads: AffineLoads, s: ComplexArray, tolerance: float) -> Sweep:
+        """Sweep them at other complex frequencies."""
+        with self._observer.phase("sweep"):
+            across = self._equations.across
+            sweep = reduced_sweep(
+                self.equations.system, loads, s, tolerance, block=self._block, across=across
+            )
+        self.tally.factorisations += sweep.factorisations
+        self.tally.solves += sweep.solves
+        return sweep
 
     def _sweep(
         self,
@@ -230,7 +286,7 @@ class _Sweeps:
                 self.tolerance,
                 report,
                 self._expansions,
-                block=round(_BLOCK[self._equations.gdim] * (_WIDER if across.size > 1 else 1)),
+                block=self._block,
                 across=across,
             )
             self._expansions, sweep = reduced.expansions, reduced

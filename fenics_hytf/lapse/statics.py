@@ -26,10 +26,9 @@ from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.ground import Ground
 from fenics_hytf.lapse.material import elastic_constants
 from fenics_hytf.lapse.unknowns import Unknowns
-from fenics_hytf.operators import ElasticForm, InternalForce, isotropic_stress, strain_rows
+from fenics_hytf.operators import ElasticForm, InternalForce, isotropic_stress
 from fenics_hytf.particles import (
     Points,
-    gradient_matrices,
     resample_matrix,
     transfer_matrix,
 )
@@ -69,7 +68,8 @@ class Statics:
         assert scene.effects.gravity is not None
         self._scene, self._domain = scene, domain
         self._gravity = scene.effects.gravity
-        self._elastic, self._force = ElasticForm(domain), InternalForce(domain)
+        locking = scene.effects.locking
+        self._elastic, self._force = ElasticForm(domain, locking), InternalForce(domain, locking)
         self._supports = static_supports(scene.supports)
         self._unknowns: Unknowns | None = None
         self._K: PETSc.Mat | None = None
@@ -153,7 +153,7 @@ class Statics:
         weight = 1.0 if self._weight is None else self._weight
         with self._factorised(weight * lame, weight * shear) as factorisation:
             R = self._resampling(points)
-            rows = strain_rows(gradient_matrices(points, domain.V), domain.num_components)
+            rows = self._force.strain_rows(points)
             f_g = unknowns.collect(self.weight_of(points))
             scale, left = f_g.norm(), np.inf
             x = f_g.duplicate()

@@ -101,7 +101,9 @@ def march(
     return _slip(forces, yield_force, kernel[: forces.size], dt, start_rate, most_slip)
 
 
-def rigid_slip(drive: npt.ArrayLike, yield_acceleration: float, dt: float) -> SlipHistory:
+def rigid_slip(
+    drive: npt.ArrayLike, yield_acceleration: float, dt: float, start_rate: float = 0.0
+) -> SlipHistory:
     """Slip of Newmark's rigid block, P = m.
 
     The work grows with the number of steps alone: where only the tips of peaks make it slip, refine
@@ -112,6 +114,7 @@ def rigid_slip(drive: npt.ArrayLike, yield_acceleration: float, dt: float) -> Sl
             sign turned [m/s^2], shape ``(num_steps,)``.
         yield_acceleration: g k_y [m/s^2].
         dt: Time step δt [s].
+        start_rate: λ̇ at sample 0 [m/s], not negative.
 
     Returns:
         The slip.
@@ -119,7 +122,7 @@ def rigid_slip(drive: npt.ArrayLike, yield_acceleration: float, dt: float) -> Sl
     Raises:
         ValueError: If an argument is out of range or not finite.
     """
-    return _slip(_row("drive", drive), yield_acceleration, np.ones(1), dt, 0.0, None)
+    return _slip(_row("drive", drive), yield_acceleration, np.ones(1), dt, start_rate, None)
 
 
 def decoupled_slip(

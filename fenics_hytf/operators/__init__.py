@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Stiffness, mass and damping matrices, and evaluation at sites as matrices."""
 
+from fenics_hytf.operators.dilation import Dilation
 from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
 from fenics_hytf.operators.forces import InternalForce, isotropic_stress
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
@@ -19,6 +20,7 @@ __all__ = [
     "BULK_OVER_SHEAR",
     "NORMAL_STRAINS",
     "DashpotForm",
+    "Dilation",
     "ElasticForm",
     "GeometricForm",
     "GhostForm",

@@ -91,6 +91,22 @@ def rotate(columns: RealArray, gradient: RealArray, shear: float) -> RealArray:
     return turned
 
 
+def shear_strain(gradient: RealArray) -> RealArray:
+    """γ = √(2 e:e) of the deviator e of the symmetric part, in plane strain that of the section.
+
+    Args:
+        gradient: L [-], shape ``(n, gdim, gdim)``.
+
+    Returns:
+        Not negative [-], shape ``(n,)``.
+    """
+    gdim = gradient.shape[1]
+    strain = 0.5 * (gradient + gradient.transpose(0, 2, 1))
+    mean = np.trace(strain, axis1=1, axis2=2) / gdim
+    deviator = strain - mean[:, None, None] * np.eye(gdim)
+    return np.asarray(np.sqrt(2.0 * np.sum(deviator**2, axis=(1, 2))))
+
+
 def update_stress(
     stress: RealArray, gradient: RealArray, lame_lambda: RealArray, shear_modulus: RealArray
 ) -> RealArray:
@@ -124,6 +140,7 @@ def update_kinematics(
     gradient: RealArray,
     lame_lambda: npt.ArrayLike | None = None,
     shear_modulus: npt.ArrayLike | None = None,
+    plastic: RealArray | None = None,
 ) -> None:
     """Carry volume, and strain and stress where the points have them, through an increment.
 
@@ -134,6 +151,8 @@ def update_kinematics(
         gradient: L[p, i, j] = d du_i / d x_j at the points [-], shape ``(n, gdim, gdim)``.
         lame_lambda: Lame's first constant [Pa], shape ``(n,)`` or one for all; for stress only.
         shear_modulus: G [Pa], likewise.
+        plastic: Of a plastic part of the increment that comes on top, which turns what points carry
+            and strains it without stress, shaped like ``gradient``.
 
     Raises:
         ValueError: If ``gradient`` has another shape, or points carry stress and a modulus is
@@ -149,10 +168,19 @@ def update_kinematics(
             raise ValueError("Found points with stress but no moduli; expected both, in Pa.")
         moduli = (np.broadcast_to(np.asarray(m, float), n) for m in (lame_lambda, shear_modulus))
         points["stress"] = update_stress(points["stress"], gradient, *moduli)
+    # What flows plastically keeps its volume, in the mean of a cell if not at every point.
+    points.volume = update_volume(points.volume, gradient)
+    if plastic is not None:
+        if "stress" in points.history:
+            points["stress"] = rotate(points["stress"], plastic, 1.0)
+        if "plastic_strain" in points.history:
+            points["plastic_strain"] = points["plastic_strain"] + shear_strain(plastic)
+        gradient = gradient + plastic
     if "strain" in points.history:
         symmetric = 0.5 * (gradient + gradient.transpose(0, 2, 1))
         points["strain"] = points["strain"] + to_components(symmetric)
+    if "shear_strain" in points.history:
+        points["shear_strain"] = points["shear_strain"] + shear_strain(gradient)
     for name, shear in _TURNING.items():
         if name in points.history:
             points[name] = rotate(points[name], gradient, shear)
-    points.volume = update_volume(points.volume, gradient)

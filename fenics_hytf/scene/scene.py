@@ -144,6 +144,12 @@ class Scene:
         return acceleration
 
     @property
+    def rest_samples(self) -> int:
+        """Samples after the last lapse within which what slides must come to rest."""
+        sliding = self.effects.sliding
+        return 0 if sliding is None else int(np.ceil(sliding.longest / self.dt))
+
+    @property
     def directions(self) -> tuple[str, ...]:
         """Direction of each motion."""
         return tuple(motion.direction for motion in self.motion)

@@ -169,8 +169,6 @@ class Sliding(Table):
 
     Attributes:
         time_step: Of the march of the slip, at most [s].
-        response: ``coupled``: slip and vibration act on each other; ``rigid``: ground that does not
-            deform but along the mechanism, for the run-out of slopes that fail.
         new_mechanism: Slip after which a new mechanism is sought, over the size of a cell [-].
         unstable_at_rest: Whether the slope may be one that does not stand under its weight.
         longest: How long it may go on after the end of the motion to come to rest [s].
@@ -179,7 +177,6 @@ class Sliding(Table):
     time_step: Annotated[float, Field(gt=0, le=0.05)] = Field(
         0.005, description="a time step above 0, at most 0.05 [s]"
     )
-    response: Literal["coupled", "rigid"] = Field("coupled", description='"coupled" or "rigid"')
     new_mechanism: Annotated[float, Field(gt=0, le=1)] = Field(
         0.3, description="a number above 0, at most 1 [-]"
     )

@@ -53,6 +53,7 @@ def mesh_faults(
         scene.mesh.points_in(domain.mesh.topology.cell_name())
     except SceneError as error:
         faults += error.faults
+    faults += _locking_faults(scene, domain)
     if scene.output is not None:
         faults += receiver_faults(domain, scene.output.receivers)
     if scene.boundary is not None and not faults:
@@ -82,6 +83,18 @@ def checked_domain(scene: Scene, comm: MPI.Comm) -> Domain:
     if domain is None or faults:
         raise SceneError(faults)
     return domain
+
+
+def _locking_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
+    """Strain of simplices of degree 1 is constant: there is no mean that they could take."""
+    name = {"triangle": "triangles", "tetrahedron": "tetrahedra"}.get(
+        domain.mesh.topology.cell_name()
+    )
+    wanted = scene.effects is not None and scene.effects.locking and domain.num_components > 1
+    if not wanted or name is None or domain.V.ufl_element().degree > 1:
+        return []
+    expected = "quadrilaterals or hexahedra, or degree 2"
+    return [Fault("effects.locking", f"{name} of degree 1", expected)]
 
 
 def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:

@@ -23,4 +23,4 @@ class Clock:
         try:
             yield
         finally:
-            self.wall_s[name] += time.perf_counter() - start
+            self.wall_s[name] = self.wall_s.get(name, 0.0) + time.perf_counter() - start

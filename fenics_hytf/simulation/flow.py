@@ -59,7 +59,7 @@ def simulate(
         run.set_up()
         if checkpoint is not None and checkpoint.found is not None:
             run.restore(checkpoint.found)
-        for segment in scene.segments[len(run.lapses) :]:
+        for segment in run.segments():
             index = segment.index
             run.weigh()
             solved = run.solve_lapse(segment)
@@ -68,7 +68,7 @@ def simulate(
             run.hand_over(solved)
             run.convect(solved)
             if snapshot is not None and (index + 1) % scene.output.every == 0:
-                run.show(solved, index, segment.stop, snapshot)
+                run.show(solved, index, snapshot)
             if checkpoint is not None:
                 run.keep(checkpoint)
         result = run.result()

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fenics_hytf.domain import constraint_matrix
+from fenics_hytf.domain import Domain, constraint_matrix
 from fenics_hytf.lapse import Scheme, excite, scheme_of, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
@@ -22,6 +22,7 @@ _ENTRY = 16  # bytes of a complex number
 # Of a reduced sweep in a section with 2 to 5 % damping: 14 to 19, and 100 to 160.
 _EXPANSIONS = 20
 _BASIS = 200
+_NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio from which cells lock noticeably
 _BASE = 250e6  # bytes: interpreter, libraries, compiled forms
 
 
@@ -119,7 +120,10 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         factorisations=(sweeps * (1 + columns) + starts) * iterations,
         shared_bytes=memory + num_points * points.bytes_per_point,
         ranks=comm.size,
-        notes=tuple(_notes(scene, scheme, lines, domain.region_names)),
+        notes=(
+            *_notes(scene, scheme, lines, domain.region_names),
+            *_locking_notes(scene, domain),
+        ),
     )
 
 
@@ -207,8 +211,25 @@ def _notes(
         yield "under steady continuity the net movement of the points in a lapse is zero"
     if effects.degradation is not None:
         yield "degradation acts between lapses: cycles of one lower the modulus from the next on"
-    if effects.geometric_stiffness:
+    if effects.geometric_stiffness and effects.gravity is None:
         yield "the points start without stress: geometric_stiffness adds nothing yet"
+
+
+def _locking_notes(scene: Scene, domain: Domain) -> Iterator[str]:
+    """Soil that hardly changes its volume, in cells that keep it from shearing then."""
+    straight = domain.mesh.topology.cell_name() in ("triangle", "tetrahedron")
+    if scene.effects.locking and straight:
+        yield "locking changes nothing in straight triangles and tetrahedra of degree 2"
+    if scene.effects.locking or domain.num_components == 1:
+        return
+    cure = "quadrilaterals or hexahedra with " if straight else ""
+    for name in domain.region_names:
+        poisson = scene.soil[name].elastic.poisson
+        if poisson >= _NEARLY_INCOMPRESSIBLE:
+            yield (
+                f"soil {name}: Poisson's ratio is {poisson:g}, at which cells lock; the cure is "
+                f"{cure}effects.locking = true"
+            )
 
 
 def _damping_notes(scene: Scene, soils: tuple[str, ...]) -> Iterator[str]:

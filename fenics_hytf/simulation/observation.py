@@ -18,7 +18,8 @@ from fenics_hytf.lapse import (
     Ground,
     Histories,
     ReceiverProbe,
-    Response,
+    Slipped,
+    SlipResult,
     Solved,
     Spectra,
     outcrop_motion,
@@ -40,12 +41,14 @@ class Seen:
         within: Acceleration of the base in the direction of each motion [m/s^2].
         outcrop: Of the bare rock likewise, or ``None``.
         cells: State of the cells.
+        slip: What slipped, or ``None``.
     """
 
     histories: Histories
     within: RealArray
     outcrop: RealArray | None
     cells: CellState
+    slip: SlipResult | None
 
 
 class Observation:
@@ -79,9 +82,9 @@ class Observation:
         self._equations, self._continuity = equations, continuity
         self.receivers = Receivers(domain, points, scene.output.receivers)
         components = domain.num_components
-        self.carried = np.zeros((len(self.receivers.names), components))
-        self.base_carried = np.zeros(components)
-        self.base_before = self.base_carried
+        self.carried: RealArray = np.zeros((len(self.receivers.names), components))
+        self.base_carried: RealArray = np.zeros(components)
+        self.base_before: RealArray = self.base_carried
         self.probe: CellProbe
         self._base: BaseProbe | None = None
 
@@ -122,7 +125,7 @@ class Observation:
         assert self._base is not None
         excitation, response = solved.excitation, solved.response
         base = self._base.motion(response)
-        histories, moved = self._at_receivers(response, base, points)
+        histories, moved = self._at_receivers(solved, base, points)
         cells = self._cell_state(solved, ground, base)
         outcrop = outcrop_motion(self._scene, self._domain, self._equations, response)
         displacement = histories.displacement + self.carried[:, :, None]
@@ -136,18 +139,23 @@ class Observation:
             within_motion(response, base),
             outcrop,
             cells,
+            None if solved.slip is None else self._slip_result(solved.slip),
         )
 
     def _at_receivers(
-        self, response: Response, base: Spectra, points: Points
+        self, solved: Solved, base: Spectra, points: Points
     ) -> tuple[Histories, RealArray]:
         """Their histories, and what the lapse has moved them by at its end."""
+        response, slip = solved.response, solved.slip
         sites, numbers = self.receivers.sites(points)
         count = len(self.receivers.names)
         probe = ReceiverProbe(self._domain, self._equations.T, sites, numbers, count)
         try:
             end = response.excitation.duration
-            return probe.histories(response, base), probe.at(response.unknowns_at(end))
+            moved = response.unknowns_at(end)
+            if slip is not None:
+                moved = moved + slip.total * slip.unknowns
+            return probe.histories(response, base, slip), probe.at(moved)
         finally:
             probe.destroy()
 
@@ -157,7 +165,7 @@ class Observation:
         if carried is not None:
             relative = carried.displacement - self.base_carried
             carried = replace(carried, displacement=relative)
-        peaks = self.probe.peaks(solved.response, solved.material, base, carried)
+        peaks = self.probe.peaks(solved.response, solved.material, base, carried, solved.slip)
         change = solved.loop.last
         effective = solved.effective_strain
         return CellState(
@@ -175,4 +183,24 @@ class Observation:
             change=np.zeros(len(ground.region)) if change is None else change,
             degradation=ground.degradation,
             fill=None if ground.filling is None else ground.filling.share,
+        )
+
+    def _slip_result(self, slip: Slipped) -> SlipResult:
+        mechanism = slip.mechanism
+        return SlipResult(
+            yield_coefficient=mechanism.yield_coefficient,
+            factor_of_safety=slip.before.factor_of_safety,
+            direction=self._domain.components[slip.before.axis],
+            sense=slip.before.sense,
+            time_step=slip.time_step,
+            slip=slip.history.slip,
+            rate=slip.history.rate,
+            driving=slip.driving,
+            rigid=slip.rigid,
+            decoupled=slip.decoupled,
+            mass=slip.mass,
+            modal_mass=slip.modal_mass,
+            dissipation=mechanism.dissipation,
+            shear_strain=self.probe.shear_strain(slip.unknowns),
+            iterations=mechanism.iterations,
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, get_type_hints
 
@@ -23,8 +24,11 @@ from fenics_hytf.lapse import (
     FreeField,
     FreeFieldState,
     Ground,
+    Handover,
     LapseResult,
     Observer,
+    Sliding,
+    SlipState,
     Solved,
     Statics,
     cell_stress,
@@ -79,6 +83,7 @@ class RunState:
     effective_strain: RealArray | None
     free_fields: tuple[FreeFieldState, ...]
     cycles: CyclicState | None
+    sliding: SlipState | None
 
 
 class Run:
@@ -104,8 +109,9 @@ class Run:
         self._effective_strain: RealArray | None = None
         self._filling: FillingSurvey | None = None
         self._statics: Statics | None = None
+        self._sliding: Sliding | None = None
         self._start_field: RealArray | float = 0.0
-        self._owned: list[Equations | Continuity | Observation | Statics | FreeField] = []
+        self._owned: list[Equations | Continuity | Observation | Statics | Sliding | FreeField] = []
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -124,6 +130,12 @@ class Run:
                 scene, self.domain, self.equations, self._statics
             )
             self._owned.append(self.continuity)
+            if scene.effects.sliding is not None:
+                assert isinstance(self.continuity, Handover) and self._statics is not None
+                self._sliding = Sliding(
+                    scene, self.domain, self.equations, self.continuity, self._statics
+                )
+                self._owned.append(self._sliding)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
             self.observation = Observation(
                 scene, self.domain, self.equations, self.continuity, self.points
@@ -165,10 +177,18 @@ class Run:
             )
             self._ground = ground
             self.equations.weigh(self.points)
-            if first and self._statics is not None and not self.lapses:
-                self._statics.settle(self.points, ground)
+            if self._statics is not None:
+                self._settle(self._statics, ground, first and not self.lapses)
             if self.scene.effects.geometric_stiffness:
                 self.equations.stiffen(cell_stress(self.domain, self.points))
+
+    def _settle(self, statics: Statics, ground: Ground, first: bool) -> None:
+        """Static stress in balance at first, and again where something has slid."""
+        slid = bool(self.lapses) and self.lapses[-1].slip is not None and self.lapses[-1].slip.slid
+        if first:
+            statics.settle(self.points, ground)
+        elif slid:
+            statics.spread(self.points, ground, limit=np.inf)
 
     def _fill(self) -> Filling | None:
         """See how far points fill the cells, where the scene lets them leave any."""
@@ -188,6 +208,11 @@ class Run:
         index, ground = segment.index, self._ground
         if self._cycles is not None:
             ground = self._ground = replace(ground, degradation=self._cycles.state.index)
+        if self._sliding is not None:
+            with self.clock.phase("mechanism"):
+                before = self._sliding.factorisations
+                self._sliding.begin(self.points, ground.filling)
+                self._work.factorisations += self._sliding.factorisations - before
         excitation = self.continuity.excite(segment)
         self.continuity.begin(self.points, excitation)
         observer = self._observer(index)
@@ -204,6 +229,7 @@ class Run:
             first_strain(self.scene, ground) if start is None else start,
             observer,
             self._strain_from,
+            self._sliding,
         )
         self._effective_strain = solved.effective_strain
         self._count(solved)
@@ -242,6 +268,7 @@ class Run:
                 outcrop=seen.outcrop,
                 cells=seen.cells,
                 seam_error=self._seam_error(solved, seen.cells),
+                slip=seen.slip,
                 energy=self._energy(solved),
                 ledger=self._ledger,
             )
@@ -309,19 +336,38 @@ class Run:
                 self._nodal_motion(solved, end, derivative=1),
                 self._nodal_motion(solved, end, derivative=2),
                 self._density,
+                self._slip(solved),
             )
         self._ledger = report.ledger
         self._work.inverse_mappings += report.inverse_mappings
         self.lapses[-1] = replace(self.lapses[-1], ledger=report.ledger)
+
+    def _slip(self, solved: Solved) -> RealArray | None:
+        """What has slipped of the nodes in the lapse [m]."""
+        slip = solved.slip
+        return None if slip is None else slip.total * slip.mechanism.field
+
+    def segments(self) -> Iterator[Segment]:
+        """The lapses: as the scene says; or from one new mechanism to the next, and on to rest."""
+        planned = self.scene.segments
+        if self._sliding is None:
+            yield from planned[len(self.lapses) :]
+            return
+        length, end = planned[0].num_samples, planned[-1].stop
+        position = sum(lapse.num_samples for lapse in self.lapses)
+        while position < end or (self._sliding.moving and position < end + self.scene.rest_samples):
+            left = end - position if position < end else length
+            yield Segment(len(self.lapses), position, min(length, left))
+            position += self.lapses[-1].num_samples
 
     def _nodal_motion(self, solved: Solved, time: float, derivative: int = 0) -> RealArray:
         """Displacement of the nodes relative to the base, or a time derivative of it."""
         unknowns = solved.response.unknowns_at(time, derivative)
         return self.equations.unknowns.expand(unknowns) - self.observation.base_at(unknowns)
 
-    def show(self, solved: Solved, index: int, stop: int, snapshot: SnapshotCallback) -> None:
+    def show(self, solved: Solved, index: int, snapshot: SnapshotCallback) -> None:
         """Hand points and fields to whoever writes them."""
-        time = stop * self.scene.dt
+        time = sum(lapse.num_samples for lapse in self.lapses) * self.scene.dt
         with self.clock.phase("output"):
             if self.domain.across.rank > 0:  # the first group has it all
                 snapshot(Snapshot(index, time, None))
@@ -353,6 +399,7 @@ class Run:
                 effective_strain=self._effective_strain,
                 free_fields=tuple(column.state() for column in self.free_fields),
                 cycles=None if self._cycles is None else self._cycles.state,
+                sliding=None if self._sliding is None else self._sliding.state,
             )
             parts = {name: getattr(state, name) for name in RunState.__dataclass_fields__}
             checkpoint.save(len(self.lapses) - 1, self.domain.comm.size, parts)
@@ -371,6 +418,8 @@ class Run:
             column.restore(column_state)
         if self._cycles is not None and state.cycles is not None:
             self._cycles.state = state.cycles
+        if self._sliding is not None:
+            self._sliding.state = state.sliding
         self.weigh()
         # Matrices that are there again were counted when they were first made.
         self._assemblies.clear()
@@ -393,7 +442,7 @@ class Run:
     def _report(self, index: int, phase: str, **values: float | str) -> None:
         if self._progress is None:
             return
-        report = Progress(index, len(self.scene.segments), phase, **values)  # type: ignore[arg-type]
+        report = Progress(index, max(len(self.scene.segments), index + 1), phase, **values)  # type: ignore[arg-type]
         try:
             self._progress(report)
         except Exception:  # rank 0 alone must not leave a run that others wait in
@@ -413,7 +462,7 @@ class Run:
             places=self.observation.receivers.places,
             region_names=self.domain.region_names,
             dt=self.scene.dt,
-            base_acceleration=self.scene.base_acceleration,
+            base_acceleration=self._base_acceleration(),
             lapses=tuple(self.lapses),
             sizes={
                 "cells": self.domain.num_cells,
@@ -423,3 +472,9 @@ class Run:
             work=self._work,
             peak_memory=self.comm.allreduce(peak_memory(), MPI.MAX),
         )
+
+    def _base_acceleration(self) -> RealArray:
+        """The motions, and nought where lapses go on after their end."""
+        given = self.scene.base_acceleration
+        after = sum(lapse.num_samples for lapse in self.lapses) - given.shape[1]
+        return np.pad(given, ((0, 0), (0, max(after, 0))))

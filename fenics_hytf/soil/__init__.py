@@ -27,6 +27,7 @@ from fenics_hytf.soil.maxwell import (
 )
 from fenics_hytf.soil.menq import menq
 from fenics_hytf.soil.models import CURVE_MODELS, curve_from_model
+from fenics_hytf.soil.mohr_coulomb import shear_strength
 from fenics_hytf.soil.published import seed_idriss_1970, vucetic_dobry_1991
 from fenics_hytf.soil.strength import LimitedCurve, limit_strength
 
@@ -60,6 +61,7 @@ __all__ = [
     "read_curve_file",
     "relaxed_factor",
     "seed_idriss_1970",
+    "shear_strength",
     "vucetic_dobry_1991",
     "wave_factors",
 ]

@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: MIT
+"""Permanent displacement over lapses: which mechanism yields, and how one gives way to the next.
+
+At the start of a lapse the strength of every cell follows from the stress that points carry
+(Mohr and Coulomb), and the mechanism φ that yields first is sought, with its k_y. In the lapse it
+slips (:mod:`.slip`). Points carry φ, which moves with them; as one mechanism gives way to the next,
+what it has of the new one's motion goes on as slip, and the rest as vibration:
+
+    λ̇ ← (φᵀMφ_old) λ̇/(φᵀMφ)
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from dolfinx.mesh import entities_to_geometry
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fenics_hytf.domain import Domain
+from fenics_hytf.lapse.continuity import Solve
+from fenics_hytf.lapse.equations import Equations, LapseEquations
+from fenics_hytf.lapse.filling import Filling
+from fenics_hytf.lapse.handover import Handover
+from fenics_hytf.lapse.mechanism import Mechanism, MechanismSearch
+from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.slip import Kernel, LapseSlip
+from fenics_hytf.lapse.slipped import Slipped, SlipState
+from fenics_hytf.lapse.starts import product
+from fenics_hytf.lapse.statics import Statics
+from fenics_hytf.particles import Points, transfer_matrix
+from fenics_hytf.scene import Fault, Scene, SceneError
+from fenics_hytf.soil import shear_strength
+
+RealArray = npt.NDArray[np.float64]
+
+# Of the largest strength: what soil without cohesion and confinement is given.
+_LEAST_STRENGTH = 1e-3
+
+
+class Sliding:
+    """Finds mechanisms and lets them slip.
+
+    Args:
+        scene: The scene; it calls for sliding and gravity.
+        domain: The domain.
+        equations: Its equations.
+        handover: Hands vibration from lapse to lapse.
+        statics: Static stress and weight.
+
+    Attributes:
+        state: What goes on with the next lapse; ``None`` before the first.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        domain: Domain,
+        equations: Equations,
+        handover: Handover,
+        statics: Statics,
+    ) -> None:
+        assert scene.effects.sliding is not None and scene.effects.gravity is not None
+        self._domain, self._equations = domain, equations
+        self._handover, self._statics = handover, statics
+        self._settings, self._g = scene.effects.sliding, scene.effects.gravity.acceleration
+        soils = [scene.soil[name] for name in domain.region_names]
+        self._cohesion = np.array([soil.cohesion or 0.0 for soil in soils])
+        self._friction_angle = np.array([soil.friction_angle or 0.0 for soil in soils])
+        self._search = MechanismSearch(domain)
+        moves = scene.effects.convection
+        self._most_slip = self._settings.new_mechanism * cell_size(domain) if moves else None
+        self.state: SlipState | None = None
+        self._mechanism: Mechanism
+        self._unknowns: RealArray
+        # Of the points at the start of a lapse.
+        self._weight: RealArray
+        self._strength: RealArray
+        self._gravity: PETSc.Vec
+
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+        self._search.destroy()
+
+    @property
+    def factorisations(self) -> int:
+        """Of secant stiffnesses, over all lapses."""
+        return self._search.factorisations
+
+    @property
+    def moving(self) -> bool:
+        """Whether something slips as the next lapse begins, or would at once."""
+        state = self.state
+        return state is not None and state.rate > 0
+
+    def begin(self, points: Points, filling: Filling | None) -> None:
+        """Find the mechanism of a lapse, and what of the last one's motion is its own (collective).
+
+        Args:
+            points: The points, weighed; their dynamic velocity and mechanism are changed in place.
+            filling: How far they fill the cells.
+
+        Raises:
+            SceneError: The slope does not stand before it is shaken.
+            MechanismError: No mechanism was found.
+        """
+        local = self._domain.input_cells
+        self._weight = np.ones(len(local)) if filling is None else filling.weight[local]
+        self._strength = self._cell_strength(points)[local]
+        self._gravity = self._statics.unknowns.collect(self._statics.weight_of(points))
+        if self.state is None:
+            self._mechanism, self.state = self._first()
+        else:
+            self._mechanism = self._next(points, self.state)
+        self._gravity.destroy()
+        self.state = self._give_way(points, self.state)
+        self._handover.steady_slip = (self._unknowns, self.state.rate)
+
+    def _cell_strength(self, points: Points) -> RealArray:
+        """Mean shear strength of every cell by volume [Pa]; 1 where there is no soil."""
+        gdim = self._domain.gdim
+        pressure = -points["stress"][:, :gdim].mean(axis=1)
+        cohesion = self._cohesion[points.region]
+        strength = shear_strength(cohesion, self._friction_angle[points.region], pressure)
+        sums, one = np.zeros((self._domain.num_owned_cells, 2)), np.ones(len(points))
+        np.add.at(sums, points.cell, points.volume[:, None] * np.stack([one, strength], axis=1))
+        volume, total = self._domain.gather_cells(sums).T
+        mean = total / np.where(volume > 0, volume, 1.0)
+        return np.where(volume > 0, np.maximum(mean, _LEAST_STRENGTH * mean.max()), 1.0)
+
+    def _first(self) -> tuple[Mechanism, SlipState]:
+        """The mechanism with the least k_y, over both senses of every horizontal motion."""
+        T = self._statics.unknowns.T
+        safety = self._search.factor_of_safety(T, self._weight, self._strength, self._gravity)
+        if safety < 1 and not self._settings.unstable_at_rest:
+            found = f"a slope with a factor of safety of {safety:.3g} at rest"
+            expected = "more than 1 before it is shaken, or unstable_at_rest = true to let it go"
+            raise SceneError([Fault("effects.sliding", found, expected)])
+        level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
+        ways = [(axis, sense) for axis in level for sense in (1, -1)]
+        candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
+        best, axis, sense = min(candidates, key=lambda found: found[0].yield_coefficient)
+        return best, SlipState(0.0, 0.0, 0.0, safety, axis, sense)
+
+    def _next(self, points: Points, state: SlipState) -> Mechanism:
+        """The mechanism now, sought from where the last one has moved to."""
+        momentum = self._momentum(points)
+        start = self._equations.unknowns.expand(self._equations.accelerate(momentum))
+        momentum.destroy()
+        return self._find(state.axis, state.sense, start)
+
+    def _find(self, axis: int, sense: int, start: RealArray | None = None) -> Mechanism:
+        T = self._statics.unknowns.T
+        driving = T.createVecRight()
+        T.multTranspose(self._equations.influence[self._equations.axes.index(axis)], driving)
+        driving.scale(sense * self._g)
+        try:
+            return self._search.find(T, self._weight, self._strength, self._gravity, driving, start)
+        finally:
+            driving.destroy()
+
+    def _momentum(self, points: Points) -> PETSc.Vec:
+        """SᵀM_p φ of the mechanism that points carry; the caller destroys it."""
+        S = transfer_matrix(points, self._domain.V)
+        momentum = S.T @ (points.mass[:, None] * points["mechanism"])
+        return self._equations.unknowns.collect(momentum.ravel())
+
+    def _give_way(self, points: Points, state: SlipState) -> SlipState:
+        """What the old mechanism has of the motion of the new one slips on, the rest vibrates."""
+        self._unknowns = self._equations.unknowns.restrict(self._mechanism.field)
+        at_points = transfer_matrix(points, self._domain.V) @ self._mechanism.field
+        rate = state.rate
+        if rate:
+            momentum = self._momentum(points)
+            phi = momentum.duplicate()
+            phi.array[:] = self._unknowns
+            M_phi = product([(self._equations.mass, 1.0)], self._unknowns, like=phi)
+            rate *= max(float(phi.dot(momentum).real / phi.dot(M_phi).real), 0.0)
+            rest = state.rate * points["mechanism"] - rate * at_points
+            points["dynamic_velocity"] = points["dynamic_velocity"] + rest
+            for vector in (momentum, phi, M_phi):
+                vector.destroy()
+        points["mechanism"] = at_points
+        return replace(state, rate=rate)
+
+    def slip(
+        self, response: Response, equations: LapseEquations, solve: Solve, kernel: Kernel
+    ) -> tuple[Response, Slipped]:
+        """Let the mechanism slip in a lapse that was solved without (collective).
+
+        Args:
+            response: The response without slip.
+            equations: The equations it was solved with.
+            solve: Sweeps them over the lines of the lapse.
+            kernel: Sweeps them over other complex frequencies, to a residual.
+
+        Returns:
+            The response with slip, of a lapse that ends where a new mechanism is due, and the slip.
+        """
+        assert self.state is not None
+        with LapseSlip(
+            self._mechanism,
+            self._unknowns,
+            self.state,
+            response,
+            equations,
+            self._equations.inertia,
+            self._handover.motion_to_end,
+            self._g * self._mechanism.yield_coefficient,
+            self._settings.time_step,
+        ) as lapse:
+            slipped = lapse.march(kernel, self._most_slip)
+            self.state = slipped.after
+            return lapse.excited(slipped, solve, self._handover.start_from), slipped
+
+
+def cell_size(domain: Domain) -> float:
+    """The smallest edge of all cells [m] (collective)."""
+    mesh = domain.mesh
+    mesh.topology.create_entities(1)
+    edges = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
+    ends = mesh.geometry.x[entities_to_geometry(mesh, 1, edges)]
+    mine = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min(initial=np.inf)
+    return float(domain.comm.allreduce(float(mine), MPI.MIN))

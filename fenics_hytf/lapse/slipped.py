@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""What slipped in a lapse, and what of it goes on: plain records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fenics_hytf.lapse.mechanism import Mechanism
+from fenics_hytf.motion import SlipHistory
+
+RealArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SlipState:
+    """What goes on from lapse to lapse.
+
+    Attributes:
+        rate: λ̇ [m/s].
+        rigid_rate: Of a rigid block [m/s].
+        decoupled_rate: Of a rigid block under the linear response [m/s].
+        factor_of_safety: At rest, before shaking [-].
+        axis: Component in which the mechanism is driven.
+        sense: Of the motion that drives it along the axis, 1 or -1.
+    """
+
+    rate: float
+    rigid_rate: float
+    decoupled_rate: float
+    factor_of_safety: float
+    axis: int
+    sense: int
+
+
+@dataclass(frozen=True, eq=False)
+class Slipped:
+    """What slipped in a lapse, the same on every rank but for φ.
+
+    Attributes:
+        mechanism: φ and k_y.
+        unknowns: φ on this rank's unknowns [-], shape ``(num_local_unknowns,)``.
+        before: What the lapse began with.
+        after: What the next one begins with.
+        history: λ, λ̇ and λ̈ at the time steps of the march, the first at the start of the lapse.
+        time_step: Of the march [s].
+        substeps: Steps of the march in one of the record.
+        driving: Q_lin over φᵀM r, the acceleration of the linear response that drives the mechanism
+            [m/s^2], at the steps of the march up to the end of the lapse.
+        num_samples: Samples of the lapse, fewer than planned where a new mechanism is due.
+        mass: φᵀM r [kg, in 2D kg/m].
+        modal_mass: φᵀMφ [kg, in 2D kg/m].
+        rigid: Slip of a rigid block in the lapse [m].
+        decoupled: Slip of a rigid block under ``driving`` [m].
+        yield_force: Q_y [N, in 2D N/m].
+    """
+
+    mechanism: Mechanism
+    unknowns: RealArray
+    before: SlipState
+    after: SlipState
+    history: SlipHistory
+    time_step: float
+    substeps: int
+    driving: RealArray
+    num_samples: int
+    mass: float
+    modal_mass: float
+    rigid: float
+    decoupled: float
+    yield_force: float
+
+    @property
+    def total(self) -> float:
+        """λ at the end of the lapse [m]."""
+        return float(self.history.slip[-1])
+
+    def at_samples(self, derivative: int = 0) -> RealArray:
+        """λ or a derivative at the samples of the lapse, shape ``(num_samples,)``."""
+        names = ("slip", "rate", "acceleration")
+        values = getattr(self.history, names[derivative])[: -1 : self.substeps].copy()
+        if derivative == 2:
+            values[:1] *= 2  # the march takes half of what is there at its first step
+        return np.asarray(values)
+
+    def seen_by(self, rows: PETSc.Mat) -> RealArray:
+        """This rank's rows of a matrix times φ, shape ``(num_local_rows,)``."""
+        phi, seen = rows.createVecs()
+        phi.array[:] = self.unknowns
+        rows.mult(phi, seen)
+        values = seen.array_r.real.copy()
+        phi.destroy()
+        seen.destroy()
+        return values
+
+    def added_to(self, rows: PETSc.Mat, derivative: int = 0) -> RealArray:
+        """What slip adds to histories of displacement or a derivative.
+
+        Args:
+            rows: Rows that evaluate the displacement.
+            derivative: Order of the time derivative.
+
+        Returns:
+            This rank's rows, shape ``(num_local_rows, num_samples)``.
+        """
+        return np.asarray(np.outer(self.seen_by(rows), self.at_samples(derivative)))
