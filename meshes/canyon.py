@@ -153,25 +153,31 @@ def _counts(
     return {name: needed[root(name)] for name in lines}
 
 
+def parser() -> argparse.ArgumentParser:
+    """Options, of the names of the arguments of :func:`canyon`."""
+    options = argparse.ArgumentParser(description="Mesh of a semi-circular canyon.")
+    options.add_argument("--radius", type=float, default=1.0, help="[m]")
+    options.add_argument("--half-width", type=float, default=8.0, help="[m]")
+    options.add_argument("--depth", type=float, default=8.0, help="[m]")
+    options.add_argument("--wavelength", type=float, default=2.0, help="the shortest one [m]")
+    options.add_argument("--cells-per-wavelength", type=float, default=6.0)
+    options.add_argument("--order", type=int, default=2, help="of the cells' geometry, 1 or 2")
+    options.add_argument("-o", "--output", type=Path, default=Path("canyon.msh"))
+    return options
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Command line.
 
     Args:
         arguments: Those of the process if ``None``.
     """
-    parser = argparse.ArgumentParser(description="Mesh of a semi-circular canyon.")
-    parser.add_argument("--radius", type=float, default=1.0, help="[m]")
-    parser.add_argument("--half-width", type=float, default=8.0, help="[m]")
-    parser.add_argument("--depth", type=float, default=8.0, help="[m]")
-    parser.add_argument("--wavelength", type=float, default=2.0, help="the shortest one [m]")
-    parser.add_argument("--cells-per-wavelength", type=float, default=6.0)
-    parser.add_argument("--order", type=int, default=2, help="of the cells' geometry, 1 or 2")
-    parser.add_argument("-o", "--output", type=Path, default=Path("canyon.msh"))
-    given = vars(parser.parse_args(arguments))
+    options = parser()
+    given = vars(options.parse_args(arguments))
     try:
         canyon(given.pop("output"), **given)
     except ValueError as error:
-        parser.error(str(error))
+        options.error(str(error))
 
 
 if __name__ == "__main__":

@@ -240,6 +240,24 @@ def demo(
     _leave("run", RunRequest(scene, folder, *settings, demo=source, resume=resume))
 
 
+@app.command(
+    add_help_option=False,
+    context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False},
+    options_metavar="",
+)
+def mesh(
+    arguments: Annotated[
+        list[str] | None, typer.Argument(metavar="[KIND] [OPTION]...", help="Kind and its options.")
+    ] = None,
+) -> None:
+    """Draw a mesh with gmsh: a slope, terraces, ...; without KIND, list the kinds."""
+    if launched_rank() != 0:
+        return
+    from fenics_hytf.cli.mesh import make_mesh
+
+    raise typer.Exit(make_mesh(arguments or []))
+
+
 @app.command()
 def accuracy(
     scene: SceneArgument,

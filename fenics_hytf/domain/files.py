@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -50,12 +51,15 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
         The mesh, its unused nodes dropped.
 
     Raises:
-        SceneError: The file cannot be read, holds no cells, several types of them or such as do not
-            make a mesh, or has cells outside every region.
+        SceneError: The file cannot be read, names groups alike or only some of them, holds no
+            cells, several types of them or such as do not make a mesh, or has cells outside every
+            region.
     """
     raw = _read(path)
+    _refuse_equal_names(path)
     kind = _cell_kind(raw, path)
     name, gdim, degree, facet_kind = _CELLS[kind]
+    _refuse_nameless(raw, {kind: gdim, facet_kind: gdim - 1}, path)
     cells = np.concatenate([b.data for b in raw.cells if b.type == kind]).astype(np.int64)
     used, inverse = np.unique(cells, return_inverse=True)
     points = _points(raw, used, gdim, path)
@@ -102,6 +106,41 @@ def _read(path: Path) -> meshio.Mesh:
     return raw
 
 
+def _refuse_equal_names(path: Path) -> None:
+    """Raise where gmsh's physical groups share a name: meshio keeps only the last of them."""
+    if path.suffix != ".msh":
+        return
+    groups: dict[str, list[str]] = {}
+    with path.open("rb") as file:  # this section is text in binary files too
+        for line in file:
+            found = re.match(rb'\s*(\d)\s+\d+\s+"(.*)"', line)
+            if found:
+                groups.setdefault(found[2].decode(errors="replace"), []).append(found[1].decode())
+            elif line.startswith((b"$EndPhysicalNames", b"$Nodes")):
+                break
+    for name, dims in groups.items():
+        if len(dims) > 1:
+            listed = " and ".join(dims)
+            raise _fault(
+                f"groups of dimension {listed} in {path.name} that are all named {name!r}",
+                "a name of its own for each physical group; one group holds any number of entities",
+            )
+
+
+def _refuse_nameless(raw: meshio.Mesh, dims: dict[str, int], path: Path) -> None:
+    """Raise where some of gmsh's groups of a dimension have names and others have none."""
+    tags = raw.cell_data.get("gmsh:physical")
+    for number, block in enumerate(raw.cells if tags is not None else []):
+        dim = dims.get(block.type, -1)
+        named = [tag for tag, of in raw.field_data.values() if of == dim]
+        nameless = np.setdiff1d(tags[number], [0, *named])  # 0: in no group
+        if named and len(nameless):
+            raise _fault(
+                f"group {nameless[0]} of dimension {dim} in {path.name}, which has no name",
+                "a name of its own for each physical group; gmsh drops one that is used twice",
+            )
+
+
 def _points(
     raw: meshio.Mesh, used: npt.NDArray[np.int64], gdim: int, path: Path
 ) -> npt.NDArray[np.float64]:
@@ -114,7 +153,7 @@ def _points(
         raise _fault(f"node {bad} of {path.name} at {raw.points[bad]}", "finite coordinates [m]")
     if points.shape[1] > gdim and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         found = f"cells of {path.name} out of the plane z = const"
-        raise _fault(found, "a 2D mesh in x and y, y up")
+        raise _fault(found, "a 2D mesh in x and y, y up, or the cells of a volume")
     return points[:, :gdim]
 
 
@@ -142,9 +181,11 @@ def _cell_kind(raw: meshio.Mesh, path: Path) -> str:
         )
     dims = {kind: _CELLS[kind][1] for kind in found if kind in _CELLS}
     top = {kind for kind, dim in dims.items() if dim == max(dims.values(), default=0)}
-    if len(top) != 1:
-        kinds = ", ".join(sorted(top)) or "no cells"
-        raise _fault(f"{kinds} in {path.name}", "cells of one type")
+    if not top:
+        only = f", only {', '.join(sorted(found))}" if found else ""
+        raise _fault(f"no cells in {path.name}{only}", "cells of an area or of a volume")
+    if len(top) > 1:
+        raise _fault(f"{', '.join(sorted(top))} in {path.name}", "cells of one type")
     return top.pop()
 
 
