@@ -38,7 +38,8 @@ class CarriedCells:
         stress: Shares of the stress, each of which fades in its own way, as half of the normal
             stresses and the shear stresses [Pa], shape
             ``(num_owned_cells, num_strains, num_shares)``.
-        fading: How they do, shape ``(num_shares, num_samples)``.
+        fading: How they do, at the samples of the lapse at least, shape
+            ``(num_shares, num_samples)``.
     """
 
     strain: RealArray
@@ -264,7 +265,9 @@ class _StressHistories:
             functions = np.tensordot(moduli, self._start, axes=1).astype(history.dtype)
             history += spectra.start.astype(history.dtype) @ functions
         if self._carried is not None:
-            shares, fading = self._carried.stress[some], self._carried.fading
+            # A lapse that a new mechanism cuts short is shorter than what was reckoned with.
+            shares = self._carried.stress[some]
+            fading = self._carried.fading[:, : history.shape[-1]]
             history += shares.astype(history.dtype) @ fading.astype(history.dtype)
         return history
 

@@ -26,6 +26,7 @@ from fenics_hytf.lapse.equations import LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.motion import Segment, excited_lines, to_frequency
 from fenics_hytf.particles import Points
 from fenics_hytf.scene import Scene
@@ -78,7 +79,11 @@ class Continuity(Protocol):
         """
 
     def energy(
-        self, response: Response, material: Material, stored_before: float | None
+        self,
+        response: Response,
+        material: Material,
+        stored_before: float | None,
+        slip: Slipped | None = None,
     ) -> Energy | None:
         """The energy ledger of the lapse (collective).
 
@@ -86,6 +91,7 @@ class Continuity(Protocol):
             response: The response, with the equations it was last solved with still at hand.
             material: The law of every cell.
             stored_before: Energy stored at the end of the lapse before [J], ``None`` at the start.
+            slip: What slips besides.
 
         Returns:
             The ledger; ``None`` where the law or the lapse has no energy of its own.
@@ -133,7 +139,13 @@ class Steady:
         """Lapses do not meet."""
         return None
 
-    def energy(self, response: Response, material: Material, stored_before: float | None) -> None:
+    def energy(
+        self,
+        response: Response,
+        material: Material,
+        stored_before: float | None,
+        slip: Slipped | None = None,
+    ) -> None:
         """Over a period nothing is stored, and what comes in is lost."""
         return None
 

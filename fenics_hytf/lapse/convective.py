@@ -20,6 +20,7 @@ from fenics_hytf.particles import (
     Points,
     PointsNotFinite,
     PointsOutside,
+    even_shift,
     gradient_matrices,
     move,
     to_tensor,
@@ -84,7 +85,9 @@ def convect(
             "lame_lambda": constants.lame_lambda[cells],
             "shear_modulus": constants.shear_modulus[cells],
         }
-    displacement = S @ (increment if slip is None else increment + slip)
+    displacement = S @ increment
+    if slip is not None:
+        displacement = displacement + S @ slip + even_shift(domain.V, slip, points)
     if np.isfinite(gradient).all():
         update_kinematics(points, gradient, **moduli, plastic=plastic)
     try:

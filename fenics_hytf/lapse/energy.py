@@ -34,12 +34,13 @@ class Energy:
     """Energy ledger of one lapse [J, in 2D J/m].
 
     Attributes:
-        input: Work of the base motion.
+        input: Work of the base motion, and of what static stress leaves out of balance.
         damping: Lost in the ground and in dashpots.
         rest: Work done against the rest of stress that fades after the moduli have changed.
-        kinetic: At the start and at the end.
+        kinetic: At the start and at the end, of what slips as well.
         strain: In the springs of the law, likewise.
         seam: Stored at the start less stored at the end of the lapse before.
+        slip: Lost in the mechanism beyond what gravity brings, Q_y λ.
     """
 
     input: float
@@ -48,6 +49,7 @@ class Energy:
     kinetic: tuple[float, float]
     strain: tuple[float, float]
     seam: float
+    slip: float = 0.0
 
     @property
     def stored(self) -> tuple[float, float]:
@@ -58,7 +60,7 @@ class Energy:
     def imbalance(self) -> float:
         """Input less what was lost, released and stored; nought but for numerical errors."""
         start, end = self.stored
-        return self.input - self.damping - self.rest - (end - start)
+        return self.input - self.damping - self.rest - self.slip - (end - start)
 
 
 class Course:

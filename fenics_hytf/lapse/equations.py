@@ -41,6 +41,7 @@ from fenics_hytf.operators import (
     ElasticForm,
     GeometricForm,
     GhostForm,
+    InternalForce,
     assemble_mass,
     rayleigh_damping,
 )
@@ -121,7 +122,8 @@ class Equations:
         self._side_forces = side_forces
         self.base_is_held = supports.get("base") != "compliant"
         self._K = self._elastic.create_matrix()
-        self._filling: Filling | None = None
+        self.filling: Filling | None = None
+        self._at_points: InternalForce | None = None  # cells that are filled in part
         self._ghost: GhostForm | None = None
         # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
@@ -188,7 +190,7 @@ class Equations:
         Returns:
             Whether the unknowns are others than before.
         """
-        before, self._filling = self._filling, filling
+        before, self.filling = self.filling, filling
         if before is not None and filling.same_cells(before):
             return False
         self._clear()
@@ -197,20 +199,15 @@ class Equations:
         domain = self._domain
         bare = filling.bare_nodes(domain)
         self.unknowns = Unknowns(domain, self._scene.supports, self.axes, bare)
-        self._ghost = GhostForm(domain, filling.ghost_facets(domain))
-        self._K = self._ghost.create_matrix()
+        self._ghost = filling.ghost(domain)
+        self._K = (self._ghost or self._elastic).create_matrix()
         return True
-
-    @property
-    def cell_weight(self) -> RealArray | None:
-        """What each local cell counts, ghosts included [-]; ``None`` where all are full."""
-        return None if self._filling is None else self._filling.weight[self._domain.input_cells]
 
     def _weighted(self, *values: RealArray) -> tuple[RealArray, ...]:
         """Values of this rank's cells, ghosts included, by the weight of each cell."""
-        weight = self.cell_weight
-        if weight is None:
+        if self.filling is None:
             return values
+        weight = self.filling.weight[self._domain.input_cells]
         return tuple(weight.reshape(-1, *[1] * (v.ndim - 1)) * v for v in values)
 
     def weigh(self, points: Points) -> None:
@@ -219,6 +216,10 @@ class Equations:
         Args:
             points: The points where they are now.
         """
+        if self.filling is not None:
+            if self._at_points is None:
+                self._at_points = InternalForce(self._domain, self._scene.effects.locking)
+            self.filling.integrate(self._at_points, self._domain, points)
         if "real" not in self._constrained:
             self._pattern()
         nodal = particle_mass_matrix(transfer_matrix(points, self._domain.V), points.mass)
@@ -284,10 +285,23 @@ class Equations:
             options.delValue(_PRODUCT)
         return self._constrained[name]
 
-    def _stiffness(self, name: str, constants: ElasticConstants) -> PETSc.Mat:
-        self._elastic.assemble(self._K, *self._weighted(*constants.at(self._domain.input_cells)))
+    def _stiffness(self, part: Part, real: ElasticConstants) -> PETSc.Mat:
+        """K of a part of the law, and K_G of loose cells, which so is damped as the ground is."""
+        cells = self._domain.input_cells
+        lame, shear = part.constants.at(cells)
+        if self.filling is None or self._at_points is None:
+            self._elastic.assemble(self._K, lame, shear)
+        else:
+            whole = self.filling.whole[cells]
+            self._elastic.assemble(self._K, whole * lame, whole * shear)
+            self._at_points.add_stiffness(self._K, lame, shear)
         self._assemblies["elasticity"] += 1
-        return self._constrain(name, self._K)
+        if self._ghost is not None:
+            across = self._domain.num_components == 1
+            modulus = real.shear_modulus if across else real.youngs_modulus
+            self._ghost.add(self._K, shear * (modulus / real.shear_modulus)[cells])
+            self._assemblies["ghost"] += 1
+        return self._constrain(part.name, self._K)
 
     def stiffen(self, stress: RealArray) -> None:
         """Rebuild K_NL, for a scene that calls for geometric stiffness.
@@ -310,15 +324,11 @@ class Equations:
         Returns:
             The equations, valid until the next call.
         """
-        parts = [(self._stiffness(p.name, p.constants), p) for p in material.parts]
+        parts = [(self._stiffness(part, material.real), part) for part in material.parts]
         terms = [(matrix, part.function) for matrix, part in parts]
         stiff = [(matrix, part.instantaneous) for matrix, part in parts]
         lasting = [(matrix, self.share_at_reference(part)) for matrix, part in parts]
-        elastic = []
-        if "geometric" in self._constrained:
-            elastic.append(self._constrained["geometric"])
-        if self._ghost is not None:
-            elastic.append(self._hold_edges(self._ghost, material.real))
+        elastic = [self._constrained["geometric"]] if "geometric" in self._constrained else []
         terms += [(matrix, constant) for matrix in elastic]
         stiff += [(matrix, 1.0) for matrix in elastic]
         lasting += [(matrix, 1.0) for matrix in elastic]
@@ -334,14 +344,6 @@ class Equations:
             stiff,
             lasting,
         )
-
-    def _hold_edges(self, form: GhostForm, constants: ElasticConstants) -> PETSc.Mat:
-        """K_G, elastic at the frequency at which the modulus is G."""
-        across = self._domain.num_components == 1
-        modulus = constants.shear_modulus if across else constants.youngs_modulus
-        form.assemble(self._K, modulus[self._domain.input_cells])
-        self._assemblies["ghost"] += 1
-        return self._constrain("ghost", self._K)
 
     def _drag(self) -> list[tuple[PETSc.Mat, float]]:
         drag = [(matrix, 1.0) for matrix, _ in self._radiating]

@@ -55,8 +55,8 @@ class DetachedError(LapseError):
         listed = ", ".join(str(cell) for cell in cells[:5])
         super().__init__(
             f"found {len(cells)} cells whose points no longer hang together with held ground, the "
-            f"first: {listed}; expected one body: let the scene park or delete such points "
-            "([points] detached)"
+            f"first: {listed}; expected ground that is held: where some of it is, let the scene "
+            "park or delete what comes off ([points] detached)"
         )
 
 

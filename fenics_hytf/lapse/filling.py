@@ -3,10 +3,14 @@
 
 A cell with points is *filled*; one that has an empty neighbour is at the *edge*. Inside, the points
 of a cell come and go without the ground being any thinner, so a cell there counts whole; at the
-edge it counts by the share that its points fill. Nodes of empty cells alone are no unknowns.
+edge it counts as far as its points fill it, and is integrated at the points, stiffness and stress
+alike. A cell at the edge that has lost a part of its points is *loose*: its stiffness may be next
+to nothing, or leave it a mechanism, and a ghost term holds it by its neighbours. Nodes of empty
+cells alone are no unknowns.
 
-Filled cells that hang together over facets are a body; one that reaches no boundary which holds it
-has come off, and what becomes of its points is the scene's policy.
+Filled cells that hang together over facets are a body. One that is not held in every direction in
+which the boundaries hold anything has come off, and what becomes of its points is the scene's
+policy. Cells that touch at a corner do not hang together: one would turn about it.
 """
 
 from __future__ import annotations
@@ -17,14 +21,25 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from fenics_hytf.domain import Domain, bare_nodes, cells_at, facet_cells, neighbours
-from fenics_hytf.lapse.errors import DetachedError, EmptyCellError
-from fenics_hytf.operators import InternalForce
+from fenics_hytf.domain import (
+    Domain,
+    bare_nodes,
+    cells_at,
+    facet_cells,
+    neighbours,
+    normal_axis,
+)
+from fenics_hytf.lapse.errors import DetachedError
+from fenics_hytf.operators import STRENGTH, GhostForm, InternalForce, gauss_sites
 from fenics_hytf.particles import Points, take_out
-from fenics_hytf.scene import Scene, default_kind
+from fenics_hytf.scene import Scene, SceneError, default_kind
 
 RealArray = npt.NDArray[np.float64]
 Cells = npt.NDArray[np.bool_]
+
+_SOUND = 0.9
+"""Share of a cell at the edge that makes it as good as full: ghost terms, which cost accuracy, are
+left to those that have lost a point or more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,20 +62,41 @@ class Filling:
         """Cells with points, shape ``(num_cells,)``."""
         return self.weight > 0
 
+    @property
+    def whole(self) -> Cells:
+        """Cells that count whole, shape ``(num_cells,)``."""
+        return self.filled & ~self.edge
+
+    @property
+    def loose(self) -> Cells:
+        """Cells at the edge that have lost a part of their points, shape ``(num_cells,)``."""
+        return self.edge & (self.share < _SOUND)
+
     def same_cells(self, other: Filling) -> bool:
-        """Whether the same cells are filled, and the same ones at the edge."""
+        """Whether the same cells are filled, and the same ones loose."""
         same = np.array_equal(self.filled, other.filled)
-        return same and np.array_equal(self.edge, other.edge)
+        return same and np.array_equal(self.loose, other.loose)
 
     def bare_nodes(self, domain: Domain) -> Cells:
         """Owned nodes that no filled cell has; see :func:`~fenics_hytf.domain.bare_nodes`."""
         return bare_nodes(domain, self.filled)
 
     def ghost_facets(self, domain: Domain) -> npt.NDArray[np.int32]:
-        """Local facets between a cell at the edge and any filled one, shape ``(n,)``."""
+        """Local facets between a loose cell and any filled one, shape ``(n,)``."""
         facets, cells = facet_cells(domain.mesh)
         both = domain.input_cells[cells]
-        return facets[self.filled[both].all(axis=1) & self.edge[both].any(axis=1)]
+        return facets[self.filled[both].all(axis=1) & self.loose[both].any(axis=1)]
+
+    def ghost(self, domain: Domain, strength: float = STRENGTH) -> GhostForm | None:
+        """What holds loose cells; ``None`` where there are none."""
+        if not self.loose.any():
+            return None
+        return GhostForm(domain, self.ghost_facets(domain), strength)
+
+    def integrate(self, force: InternalForce, domain: Domain, points: Points) -> None:
+        """Let forces be integrated over what is filled."""
+        local = domain.input_cells
+        force.occupy(points, self.whole[local], self.edge[local])
 
 
 class FillingSurvey:
@@ -75,11 +111,13 @@ class FillingSurvey:
         self._domain, self._policy = domain, scene.points.detached
         self._pairs = neighbours(domain)
         kinds = {name: default_kind(name) for name in domain.boundaries} | scene.supports
-        holding = [name for name in domain.boundaries if kinds[name] != "free"]
-        self._held = cells_at(domain, holding)
-        force = InternalForce(domain)
-        volume = np.bincount(force.sites.cell, force.volume, domain.num_owned_cells)
-        self._volume = domain.gather_cells(volume)
+        holding: dict[int, list[str]] = {}
+        for name in domain.boundaries:
+            for axis in _held_axes(domain, name, kinds[name]):
+                holding.setdefault(axis, []).append(name)
+        # Of each direction that anything is held in, the cells at the boundaries that do.
+        self._held = [cells_at(domain, names) for names in holding.values()]
+        self._volume = domain.gather_cells(gauss_sites(domain)[1].sum(axis=1))
 
     def __call__(self, points: Points) -> Filling:
         """See how the points fill the cells; those of a body that came off are taken out.
@@ -91,21 +129,19 @@ class FillingSurvey:
             The filling, the same on every rank.
 
         Raises:
-            DetachedError: A body has come off and the policy is ``error``.
-            EmptyCellError: No cell that is held has any points.
+            DetachedError: A body has come off and the policy is ``error``, or nothing else is left.
         """
         share = self._share(points)
         body = self._bodies(share > 0)
-        attached = np.isin(body, np.unique(body[self._held])) & (body >= 0)
+        attached = share > 0
+        for held in self._held:
+            attached &= np.isin(body, body[held])
         off = (share > 0) & ~attached
-        if off.any():
-            gone = off[self._domain.input_cells[points.cell]]
-            if self._policy == "error":
-                raise DetachedError([int(cell) for cell in np.flatnonzero(off)])
-            take_out(points, gone, self._policy)
-            share = self._share(points)
-        if not share.any():
-            raise EmptyCellError([int(cell) for cell in self._held])
+        if (self._policy == "error" and off.any()) or not attached.any():
+            raise DetachedError([int(cell) for cell in np.flatnonzero(off)])
+        if self._policy != "error" and off.any():
+            take_out(points, off[self._domain.input_cells[points.cell]], self._policy)
+            share = np.where(off, 0.0, share)
         return self._weigh(share)
 
     def _share(self, points: Points) -> RealArray:
@@ -128,3 +164,18 @@ class FillingSurvey:
         edge &= filled
         weight = np.where(edge, np.minimum(share, 1.0), filled.astype(float))
         return Filling(weight, edge, share)
+
+
+def _held_axes(domain: Domain, name: str, kind: str) -> tuple[int, ...]:
+    """Components in which a boundary holds the ground in the long run (collective)."""
+    every = tuple(range(domain.num_components))
+    if kind in ("free", "tied"):
+        return ()
+    if kind in ("rigid", "fixed", "compliant"):
+        return every
+    if domain.num_components == 1:  # across the plane a roller is free
+        return () if kind == "roller" else every
+    try:
+        return (normal_axis(domain, name),)
+    except SceneError:  # dashpots on what is no plane
+        return every

@@ -30,12 +30,14 @@ from fenics_hytf.frequency import AffineLoads, Columns
 from fenics_hytf.lapse.carried import FADING, State, fading, half_of_normal, stress_of
 from fenics_hytf.lapse.cells import CarriedCells
 from fenics_hytf.lapse.continuity import Solve
-from fenics_hytf.lapse.energy import Course, Energy
+from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
-from fenics_hytf.lapse.material import Material, Part
+from fenics_hytf.lapse.handover_energy import LapseForces, handover_energy
+from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.motion import (
@@ -122,9 +124,10 @@ class Handover:
         self._excitation = excitation
         if not self._resampling or self._scene.effects.convection:  # else points stay in place
             mesh, degree = self._domain.mesh, self._domain.V.ufl_element().degree
-            places = (self._force.sites, self._centres)
-            self._resampling = [resample_matrix(mesh, points, degree, there) for there in places]
-        self._force.weigh(self._equations.cell_weight)
+            if self._equations.filling is not None:
+                self._equations.filling.integrate(self._force, self._domain, points)
+            centres = resample_matrix(mesh, points, degree, self._centres)
+            self._resampling = [self._force.resampling(points), centres]
         self._at_gauss, self._at_centres = (State.of(points, R) for R in self._resampling)
         S = transfer_matrix(points, self._domain.V)
         self.destroy()
@@ -238,7 +241,8 @@ class Handover:
 
         Shape ``(num_motions, num_samples + 1)``.
         """
-        return self._record.samples[:, self._segment.start : self._segment.stop + 1]
+        given = self._record.samples[:, self._segment.start : self._segment.stop + 1]
+        return np.pad(given, ((0, 0), (0, self._segment.num_samples + 1 - given.shape[1])))
 
     def _start_force(
         self,
@@ -296,79 +300,33 @@ class Handover:
         )
 
     def energy(
-        self, response: Response, material: Material, stored_before: float | None
+        self,
+        response: Response,
+        material: Material,
+        stored_before: float | None,
+        slip: Slipped | None = None,
     ) -> Energy | None:
         """What came in, was lost and is stored; not known beside a free field, which does work."""
         law, sides = self._scene.solver.complex_modulus, self._scene.supports.values()
         causal = law == "maxwell" or len(material.parts) == 1
         if not causal or "free_field" in sides:
             return None
-        course, segment = Course(response, self._domain.comm), self._segment
-        v = course.coordinates(1)
-        count = segment.num_samples + 1
-        motion = self._record.samples[:, segment.start : segment.start + count]
-        motion = np.pad(motion, ((0, 0), (0, count - motion.shape[1])))
-        power, lost = np.zeros((2, count))
-        for acceleration, inertia in zip(motion, self._equations.inertia, strict=True):
-            power += acceleration * course.linear(inertia, v)
-        for C in self._solved.viscous:
-            lost += course.quadratic(C, v)
         *forces, rest = self._forces(material)
-        # Matrices of the parts come first among the stiff ones, K_NL after them.
-        parts = zip(material.parts, forces, self._solved.stiff, strict=False)
-        for part, force, (matrix, _) in parts:
-            tau = part.relaxation_time
-            if tau is not None:  # ζ = ζ₀ e^{−t/τ} + what the lapse adds
-                z, left = course.coordinates(relaxation_time=tau), np.exp(-course.time / tau)
-                held = 2 * self._elastic_energy(self._at_gauss, material, only=part)
-                cross = course.linear(force, z)
-                lost += (course.quadratic(matrix, z) + 2 * left * cross + left**2 * held) / tau
-        released = np.exp(-course.time / FADING) * course.linear(rest, v)
-        kinetic = 0.5 * course.quadratic(self._solved.system.mass, v)[[0, -1]]
-        for force in (*forces, rest):
-            force.destroy()
-        strain = [
-            self._elastic_energy(state, material)
-            for state in (self._at_gauss, self._at_end(response))
-        ]
-        stored = float(kinetic[0]) + strain[0]
-        return Energy(
-            course.integral(power),
-            course.integral(lost),
-            course.integral(released),
-            (float(kinetic[0]), float(kinetic[1])),
-            (strain[0], strain[1]),
-            0.0 if stored_before is None else stored - stored_before,
-        )
-
-    def _at_end(self, response: Response) -> State:
-        """Strain and memory at the Gauss points at the end of the lapse."""
-        end, state = response.excitation.duration, self._at_gauss
-
-        def added(relaxation_time: float | None = None) -> RealArray:
-            unknowns = response.unknowns_at(end, relaxation_time=relaxation_time)
-            return self._force.strain(self._equations.unknowns.expand(unknowns))
-
-        memory = state.memory
-        if memory is not None:
-            memory = np.stack(
-                [
-                    memory[:, branch] * np.exp(-end / tau) + added(tau)
-                    for branch, tau in enumerate(RELAXATION_TIMES)
-                ],
-                axis=1,
+        try:
+            return handover_energy(
+                LapseForces(self._force, forces, rest, self._imbalance, self.motion_to_end),
+                self._domain,
+                self._equations,
+                self._solved,
+                self._at_gauss,
+                response,
+                material,
+                stored_before,
+                slip,
             )
-        return State(state.displacement, state.strain + added(), state.stress, memory)
-
-    def _elastic_energy(self, state: State, material: Material, only: Part | None = None) -> float:
-        """½ ∫ strain:D:strain of the parts of a law, or of one of them (collective)."""
-        cells = self._domain.input_cells[self._force.sites.cell]
-        total = 0.0
-        for part in material.parts if only is None else (only,):
-            strain = state.strain_of(part)
-            density = np.sum(strain * isotropic_stress(strain, *part.constants.at(cells)), axis=1)
-            total += 0.5 * float(self._force.volume @ density)
-        return float(self._domain.comm.allreduce(total))
+        finally:
+            for force in (*forces, rest):
+                force.destroy()
 
     def finish(self, points: Points, response: Response, material: Material) -> None:
         """Displacement, velocity, strain, memory and stress at the end of the lapse."""

@@ -24,14 +24,16 @@ from fenics_hytf.frequency import DynamicSystem, SymmetricFactorisation, constan
 from fenics_hytf.lapse.errors import BalanceError
 from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.ground import Ground
-from fenics_hytf.lapse.material import elastic_constants
+from fenics_hytf.lapse.material import ElasticConstants, elastic_constants
 from fenics_hytf.lapse.unknowns import Unknowns
-from fenics_hytf.operators import ElasticForm, InternalForce, isotropic_stress
-from fenics_hytf.particles import (
-    Points,
-    resample_matrix,
-    transfer_matrix,
+from fenics_hytf.operators import (
+    STRENGTH,
+    ElasticForm,
+    GhostForm,
+    InternalForce,
+    isotropic_stress,
 )
+from fenics_hytf.particles import Points, transfer_matrix
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
@@ -41,6 +43,8 @@ BALANCE = 1e-9
 
 _LEVEL = 1e-6  # shear over vertical stress, below which ground is level
 _STEPS = 40  # of spreading: points on Gauss points take one, others some ten
+# Strength of the ghost term here: it bears what acts on mechanisms, and hardly anything else.
+_LIGHTLY = 1e-6 * STRENGTH
 
 
 def static_supports(supports: dict[str, str]) -> dict[str, str]:
@@ -73,11 +77,13 @@ class Statics:
         self._supports = static_supports(scene.supports)
         self._unknowns: Unknowns | None = None
         self._K: PETSc.Mat | None = None
-        self._weight: RealArray | None = None
+        self._filling: Filling | None = None
+        self._ghost: GhostForm | None = None
+        self._K_G: PETSc.Mat | None = None
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        for owned in (self._unknowns, self._K):
+        for owned in (self._unknowns, self._K, self._K_G):
             if owned is not None:
                 owned.destroy()
 
@@ -93,16 +99,16 @@ class Statics:
 
         Args:
             filling: The filling.
-            others: Whether other cells are filled than before.
+            others: Whether other cells are filled, or loose, than before.
         """
         if others and self._unknowns is not None:
             self.destroy()
-            self._unknowns, self._K = None, None
+            self._unknowns, self._K, self._K_G = None, None, None
         if self._unknowns is None:
             bare = filling.bare_nodes(self._domain)
             self._unknowns = Unknowns(self._domain, self._supports, bare=bare)
-        self._weight = filling.weight[self._domain.input_cells]
-        self._force.weigh(self._weight)
+            self._ghost = filling.ghost(self._domain, _LIGHTLY)
+        self._filling = filling
 
     def settle(self, points: Points, ground: Ground) -> None:
         """Give points their first stress (collective).
@@ -138,7 +144,10 @@ class Statics:
         points["stress"] = stress
 
     def spread(self, points: Points, ground: Ground, limit: float = BALANCE) -> None:
-        """Spread elastically what is out of balance (collective).
+        """Spread elastically what is out of balance, as far as can be (collective).
+
+        What acts on a mechanism of a loose cell, which no stress of its points can bear, is borne
+        by the ghost term that holds it.
 
         Args:
             points: Points, their stress changed in place.
@@ -150,9 +159,8 @@ class Statics:
         """
         domain, unknowns = self._domain, self.unknowns
         lame, shear = elastic_constants(ground, self._scene.solver).at(domain.input_cells)
-        weight = 1.0 if self._weight is None else self._weight
-        with self._factorised(weight * lame, weight * shear) as factorisation:
-            R = self._resampling(points)
+        R = self._resampling(points)
+        with self._factorised(lame, shear) as factorisation:
             rows = self._force.strain_rows(points)
             f_g = unknowns.collect(self.weight_of(points))
             scale, left = f_g.norm(), np.inf
@@ -160,34 +168,46 @@ class Statics:
             for _ in range(_STEPS):
                 residual = unknowns.collect(self._internal(points, R))
                 residual.aypx(-1.0, f_g)
+                factorisation.backsolve(residual, x)
+                if self._K_G is not None:
+                    residual.axpy(-1.0, self._K_G @ x)
                 before, left = left, residual.norm() / scale
-                if left > limit and left < before:
-                    factorisation.backsolve(residual, x)
-                    u = unknowns.expand(x.array_r.real)
-                    strain = (rows @ u.ravel()).reshape(len(points), -1)
-                    constants = lame[points.cell], shear[points.cell]
-                    points["stress"] = points["stress"] + isotropic_stress(strain, *constants)
                 residual.destroy()
-                if left <= limit or left >= before:
+                if left <= BALANCE or left >= before:
                     break
+                u = unknowns.expand(x.array_r.real)
+                strain = (rows @ u.ravel()).reshape(len(points), -1)
+                constants = lame[points.cell], shear[points.cell]
+                points["stress"] = points["stress"] + isotropic_stress(strain, *constants)
             for vector in (f_g, x):
                 vector.destroy()
         if left > limit:
             raise BalanceError(left, limit)
 
     def _factorised(self, lame: RealArray, shear: RealArray) -> SymmetricFactorisation:
-        T = self.unknowns.T
-        nodal = self._elastic.create_matrix()
-        self._elastic.assemble(nodal, lame, shear)
+        T, cells = self.unknowns.T, self._domain.input_cells
+        nodal = (self._ghost or self._elastic).create_matrix()
+        if self._ghost is not None:
+            self._ghost.assemble(nodal, ElasticConstants(lame, shear).youngs_modulus)
+            self._K_G = nodal.ptap(T, result=self._K_G)
+        if self._filling is None:
+            self._elastic.assemble(nodal, lame, shear)
+        else:
+            whole = self._filling.whole[cells]
+            self._elastic.assemble(nodal, whole * lame, whole * shear)
+            self._force.add_stiffness(nodal, lame, shear)
         self._K = nodal.ptap(T, result=self._K)
         nodal.destroy()
-        factorisation = SymmetricFactorisation(DynamicSystem([(self._K, constant)], self._K))
+        terms = [(K, constant) for K in (self._K, self._K_G) if K is not None]
+        factorisation = SymmetricFactorisation(DynamicSystem(terms, self._K))
         factorisation.factorise(0.0)
         return factorisation
 
     def _resampling(self, points: Points) -> sparse.csr_matrix:
-        degree = self._domain.V.ufl_element().degree
-        return resample_matrix(self._domain.mesh, points, degree, self._force.sites)
+        """From the points to where the force is integrated, which goes with them."""
+        if self._filling is not None:
+            self._filling.integrate(self._force, self._domain, points)
+        return self._force.resampling(points)
 
     def weight_of(self, points: Points) -> RealArray:
         """Weight of the points at this rank's nodes [N, in 2D N/m].

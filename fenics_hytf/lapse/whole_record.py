@@ -28,6 +28,7 @@ from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
+from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
 from fenics_hytf.motion import (
     LapseRecord,
@@ -148,7 +149,13 @@ class WholeRecord:
             largest(comm, v - points["dynamic_velocity"]),
         )
 
-    def energy(self, response: Response, material: Material, stored_before: float | None) -> None:
+    def energy(
+        self,
+        response: Response,
+        material: Material,
+        stored_before: float | None,
+        slip: Slipped | None = None,
+    ) -> None:
         """A law that feels the future has no energy at an instant."""
         return None
 

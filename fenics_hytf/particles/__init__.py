@@ -5,6 +5,7 @@ The soil's mass is carried by points that weigh on the nodes through M = S^T M_p
 lapses they move through the mesh, which stays, and are found again by Newton's method (7)-(9).
 """
 
+from fenics_hytf.particles.flow import even_shift
 from fenics_hytf.particles.geometry import cell_grid
 from fenics_hytf.particles.kinematics import (
     to_components,
@@ -46,6 +47,7 @@ __all__ = [
     "cell_centres",
     "cell_grid",
     "default_points_per_cell",
+    "even_shift",
     "gather_points",
     "gradient_matrices",
     "inverse_map",

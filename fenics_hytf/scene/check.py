@@ -176,7 +176,7 @@ def _soil_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
         return
     empty = as_list(mesh.get("empty"))
     for i, name in enumerate(empty):
-        if name in soils:
+        if isinstance(name, str) and name in soils:
             expected = "the name of a region without soil"
             yield Fault(join_key("mesh.empty", i), f"{toml_text(name)}, a soil", expected)
     for key, name in _named_soils(mesh):

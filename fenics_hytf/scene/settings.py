@@ -175,7 +175,7 @@ class Sliding(Table):
     """
 
     time_step: Annotated[float, Field(gt=0, le=0.05)] = Field(
-        0.005, description="a time step above 0, at most 0.05 [s]"
+        0.0025, description="a time step above 0, at most 0.05 [s]"
     )
     new_mechanism: Annotated[float, Field(gt=0, le=1)] = Field(
         0.3, description="a number above 0, at most 1 [-]"
@@ -196,7 +196,8 @@ class Effects(Table):
         calm: The absorbing layer, or ``None``.
         gravity: Weight and initial stress, or ``None``.
         sliding: Permanent displacement, or ``None``.
-        locking: Volumetric strain is the mean of a cell, against locking near ν = 0.5.
+        locking: Volumetric strain varies less within a cell than shear strain, at degree 1 not at
+            all, against locking near ν = 0.5.
     """
 
     equivalent_linear: EquivalentLinear | None = Field(None, description="a table, true or false")
