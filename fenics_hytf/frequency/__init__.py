@@ -11,6 +11,7 @@ from fenics_hytf.frequency.errors import (
     SweepError,
 )
 from fenics_hytf.frequency.groups import share
+from fenics_hytf.frequency.inertia import negative_eigenvalues
 from fenics_hytf.frequency.loads import AffineLoads, Loads
 from fenics_hytf.frequency.products import multiply
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
@@ -43,6 +44,7 @@ __all__ = [
     "direct_sweep",
     "hysteretic",
     "multiply",
+    "negative_eigenvalues",
     "radiation",
     "reduced_sweep",
     "share",

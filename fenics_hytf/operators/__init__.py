@@ -5,8 +5,9 @@ from fenics_hytf.operators.dilation import Dilation
 from fenics_hytf.operators.facets import DashpotForm, TractionForm, boundary_area, mean_rows
 from fenics_hytf.operators.forces import InternalForce, isotropic_stress
 from fenics_hytf.operators.forms import ElasticForm, GeometricForm
-from fenics_hytf.operators.ghost import GhostForm
+from fenics_hytf.operators.ghost import STRENGTH, GhostForm
 from fenics_hytf.operators.mass import assemble_mass, rayleigh_damping
+from fenics_hytf.operators.quadrature import gauss_sites
 from fenics_hytf.operators.rows import (
     NORMAL_STRAINS,
     constrained_rows,
@@ -19,6 +20,7 @@ from fenics_hytf.operators.secant import BULK_OVER_SHEAR, SecantForm
 __all__ = [
     "BULK_OVER_SHEAR",
     "NORMAL_STRAINS",
+    "STRENGTH",
     "DashpotForm",
     "Dilation",
     "ElasticForm",
@@ -31,6 +33,7 @@ __all__ = [
     "boundary_area",
     "constrained_rows",
     "displacement_rows",
+    "gauss_sites",
     "isotropic_stress",
     "mean_rows",
     "rayleigh_damping",

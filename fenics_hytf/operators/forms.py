@@ -18,6 +18,8 @@ from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
+from fenics_hytf.operators.dilation import Dilation
+from fenics_hytf.operators.quadrature import quadrature_degree
 
 
 class ElasticForm:
@@ -25,19 +27,26 @@ class ElasticForm:
 
     Args:
         domain: The domain.
+        locking: Whether the volumetric strain is that of :mod:`.dilation`, against locking;
+            shear across the plane has none.
     """
 
-    def __init__(self, domain: Domain) -> None:
+    def __init__(self, domain: Domain, locking: bool = False) -> None:
         cells = functionspace(domain.mesh, ("DG", 0))
         self._lame_lambda, self._shear_modulus = Function(cells), Function(cells)
         u, v = ufl.TrialFunction(domain.V), ufl.TestFunction(domain.V)
+        self._gdim = domain.gdim
+        self._dilation = Dilation(domain) if locking and domain.num_components > 1 else None
 
         if domain.num_components == 1:
             density = self._shear_modulus * ufl.inner(ufl.grad(u), ufl.grad(v))
         else:
             strain_u, strain_v = ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))
-            stress = self._lame_lambda * ufl.tr(strain_u) * ufl.Identity(domain.gdim)
-            stress += 2 * self._shear_modulus * strain_u
+            if self._dilation is None:
+                stress = self._lame_lambda * ufl.tr(strain_u) * ufl.Identity(domain.gdim)
+                stress += 2 * self._shear_modulus * strain_u
+            else:
+                stress = 2 * self._shear_modulus * ufl.dev(strain_u)
             density = ufl.inner(stress, strain_v)
         self._form = form(density * _dx(domain))
 
@@ -62,6 +71,8 @@ class ElasticForm:
         self._shear_modulus.x.array[:] = shear_modulus
         matrix.zeroEntries()
         assemble_matrix(matrix, self._form)
+        if self._dilation is not None:
+            self._dilation.add_stiffness(matrix, lame_lambda + 2 / self._gdim * shear_modulus)
         matrix.assemble()
 
 
@@ -90,14 +101,6 @@ class GeometricForm:
         matrix.zeroEntries()
         assemble_matrix(matrix, self._form)
         matrix.assemble()
-
-
-def quadrature_degree(domain: Domain) -> int:
-    """Of the rule that the stiffness is integrated with: degree + 1 Gauss points a direction.
-
-    It integrates the stiffness of a parallelogram exactly.
-    """
-    return int(2 * domain.V.ufl_element().degree)
 
 
 def _dx(domain: Domain) -> ufl.Measure:

@@ -18,11 +18,11 @@ import basix
 import numpy as np
 import numpy.typing as npt
 import ufl
-from ufl.geometry import FacetJacobianDeterminant
 from dolfinx.fem import Constant, Function, form, functionspace
 from dolfinx.fem.petsc import assemble_matrix, create_matrix
 from dolfinx.mesh import meshtags
 from petsc4py import PETSc
+from ufl.geometry import FacetJacobianDeterminant
 
 from fenics_hytf.domain import Domain
 
@@ -74,8 +74,17 @@ class GhostForm:
             matrix: From :meth:`create_matrix`, overwritten.
             modulus: E of each local cell, ghosts included [Pa], shape ``(num_local_cells,)``.
         """
-        self._modulus.x.array[:] = modulus
         matrix.zeroEntries()
+        self.add(matrix, modulus)
+
+    def add(self, matrix: PETSc.Mat, modulus: npt.NDArray[np.float64]) -> None:
+        """Add to a matrix that has been assembled.
+
+        Args:
+            matrix: From :meth:`create_matrix`.
+            modulus: As for :meth:`assemble`.
+        """
+        self._modulus.x.array[:] = modulus
         assemble_matrix(matrix, self._form)
         matrix.assemble()
 

@@ -62,6 +62,21 @@ def strain_rows(gradients: Sequence[sparse.csr_matrix], num_components: int) -> 
     return _interleave(parts, num_sites)
 
 
+def divergence_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
+    """Rows that evaluate the trace of strain, of a displacement with a component an axis.
+
+    Args:
+        gradients: ∂N/∂x_j at the sites [1/m], one matrix an axis, shape
+            ``(num_sites, num_local_nodes)`` each.
+
+    Returns:
+        Shape ``(num_sites, num_local_nodes·gdim)``, components fastest.
+    """
+    gdim = len(gradients)
+    parts = [sparse.kron(gradient, _unit(i, gdim)) for i, gradient in enumerate(gradients)]
+    return sparse.csr_matrix(sum(parts[1:], parts[0]))
+
+
 def _interleave(parts: Sequence[sparse.csr_matrix], num_sites: int) -> sparse.csr_matrix:
     """Rows of all parts, site by site."""
     stacked = sparse.csr_matrix(sparse.vstack(parts))

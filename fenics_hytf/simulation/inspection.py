@@ -105,6 +105,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     sweeps = sum(solved) + (sum(solved[1:]) if twice else 0)
     # One more finds how a lapse starts; beside a whole record the first one starts at rest.
     starts = {"steady": 0, "handover": len(lines), "whole_record": len(lines) - 1}[scheme.name]
+    counted = scene.effects.geometric_stiffness and scene.effects.gravity is not None
     num_points = comm.allreduce(len(points))
     memory = _memory(unknowns, domain.gdim, held, _num_parts(scene))
     return Inspection(
@@ -117,7 +118,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         continuity=_continuity(scene, scheme),
         complex_modulus=_complex_modulus(scene),
         lines=lines,
-        factorisations=(sweeps * (1 + columns) + starts) * iterations,
+        factorisations=(sweeps * (1 + columns) + starts) * iterations + counted * len(lines),
         shared_bytes=memory + num_points * points.bytes_per_point,
         ranks=comm.size,
         notes=(

@@ -48,11 +48,13 @@ class Snapshot:
         points: Arrays of the material points by name (``position`` [m] with shape
             ``(num_points, gdim)``, ``displacement`` [m], ``mass`` [kg/m or kg], ``volume``,
             ``id``, ``cell``, ``shear_modulus`` [Pa] ...), or ``None``.
-        vertices: Mesh vertices [m], shape ``(num_vertices, gdim)``, or ``None`` without fields.
+        vertices: Mesh vertices [m], shape ``(num_vertices, gdim)``, or ``None`` where neither
+            fields nor the mesh are written.
         cells: Vertices of each cell in VTK order, shape ``(num_cells, n)``, or ``None``.
         cell_type: meshio's name of the cell type.
         vertex_fields: By name, shape ``(num_vertices, gdim)`` or ``(num_vertices,)``.
-        cell_fields: By name, shape ``(num_cells,)``.
+        cell_fields: By name, shape ``(num_cells,)``; cells whose ``fill`` is 0 are empty.
+        with_mesh: Whether the mesh is written by itself: points move over it.
     """
 
     index: int
@@ -63,6 +65,7 @@ class Snapshot:
     cell_type: str = ""
     vertex_fields: dict[str, RealArray] = field(default_factory=dict)
     cell_fields: dict[str, RealArray] = field(default_factory=dict)
+    with_mesh: bool = False
 
 
 @dataclass(frozen=True)

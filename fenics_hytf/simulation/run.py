@@ -195,6 +195,8 @@ class Run:
         if self._filling is None:
             return None
         filling = self._filling(self.points)
+        ledger = self.points.ledger(self.domain.comm)
+        self._ledger = replace(ledger, migrated=self._ledger.migrated)
         others = self.equations.occupy(filling)
         if others:
             self.observation.look_at(filling.filled)
@@ -286,7 +288,7 @@ class Run:
     def _energy(self, solved: Solved) -> Energy | None:
         before = self.lapses[-1].energy if self.lapses else None
         stored = None if before is None else before.stored[1]
-        return self.continuity.energy(solved.response, solved.material, stored)
+        return self.continuity.energy(solved.response, solved.material, stored, solved.slip)
 
     def count_cycles(self, solved: Solved) -> None:
         """Cycles of the lapse lower the shear modulus of the next."""
