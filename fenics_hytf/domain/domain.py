@@ -213,13 +213,16 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
     if mesh is None:
         raise SceneError([])
     if mesh.column is not None:
-        return emptied(column_mesh(mesh.column), mesh.empty), []
-    if mesh.box is not None:
-        return emptied(box_mesh(mesh.box, mesh, soils), mesh.empty), []
-    data = read_mesh(Path(mesh.file or ""), (*soils, *mesh.empty))
+        data = column_mesh(mesh.column)
+    elif mesh.box is not None:
+        data = box_mesh(mesh.box, mesh, soils)
+    else:
+        data = read_mesh(Path(mesh.file or ""), (*soils, *mesh.empty))
     faults = _unknown_regions(mesh.empty, data)
     data = emptied(data, mesh.empty)
-    return data, [*faults, *_file_faults(scene, data)]
+    if not data.region_names:
+        faults.append(Fault("mesh.empty", "every region of the mesh", "one with soil"))
+    return data, faults if mesh.file is None else [*faults, *_file_faults(scene, data)]
 
 
 def _unknown_regions(empty: tuple[str, ...], data: MeshData) -> list[Fault]:

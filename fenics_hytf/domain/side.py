@@ -69,7 +69,8 @@ def side_column(domain: Domain, name: str) -> SideColumn:
     nodes = boundary_nodes(domain, name)
     nodes = nodes[nodes < domain.V.dofmap.index_map.size_local]
     height = domain.V.tabulate_dof_coordinates()[nodes, up]
-    nodes = nodes[height <= levels[-1] * (1 + _SAME)]
+    slack = _SAME * (levels[-1] - levels[0])
+    nodes = nodes[(height >= levels[0] - slack) & (height <= levels[-1] + slack)]
     places = np.full((len(nodes), domain.gdim), width / 2)
     places[:, up] = domain.V.tabulate_dof_coordinates()[nodes, up]
     return SideColumn(column, beyond, nodes, places)
@@ -146,6 +147,9 @@ def _layers(
         np.concatenate(part) for part in zip(*domain.comm.allgather(mine), strict=True)
     )
     every = np.unique(np.concatenate([bottom, top]))
+    if not len(every):
+        expected = "soil beside a side that is free_field"
+        raise SceneError([Fault(f"boundary.{name}", "no soil", expected)])
     slack = _SAME * (every[-1] - every[0])
     levels = every[np.concatenate([[True], np.diff(every) > slack])]
     middle = (levels[1:] + levels[:-1]) / 2

@@ -63,6 +63,8 @@ def describe_scene(scene: Scene, region_names: tuple[str, ...]) -> dict[str, Any
         "strain_measure": "plane" if loop is None else loop.strain,
         "rayleigh": None if effects.rayleigh is None else effects.rayleigh.model_dump(),
         "degradation": None if effects.degradation is None else effects.degradation.model_dump(),
+        "gravity": None if effects.gravity is None else effects.gravity.model_dump(),
+        "sliding": None if effects.sliding is None else effects.sliding.model_dump(),
         "calm": None if effects.calm is None else effects.calm.model_dump(),
         "water_table_m": scene.output.water_table,
         "solver": solver.model_dump(),
@@ -101,6 +103,8 @@ def _soil(soil: Soil, with_curves: bool) -> dict[str, Any]:
         "shear_modulus_pa": elastic.shear_modulus,
         "poisson": elastic.poisson,
         "damping": soil.damping_ratio(with_curves),
+        "cohesion_pa": soil.cohesion,
+        "friction_angle_degrees": soil.friction_angle,
         "curves": _curves(soil) if with_curves else None,
     }
 

@@ -4,10 +4,12 @@
 Energies are in J, in two dimensions of a slice one metre thick, J/m; ``unit`` says which. Over the
 lapses of a run
 
-    Σ input − Σ damping − Σ rest + Σ seam − Σ imbalance = stored at the end − stored at the start
+    Σ input − Σ damping − Σ rest − Σ slip + Σ seam − Σ imbalance
+        = stored at the end − stored at the start
 
-with what the seams put in (``seam``, stored at the start of a lapse less at the end of the one
-before) and what does not close (``imbalance``).
+with what mechanisms take beyond what gravity brings them (``slip``), what the seams put in
+(``seam``, stored at the start of a lapse less at the end of the one before) and what does not close
+(``imbalance``).
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from fenics_hytf.lapse import Energy, LapseResult
 
-_SUMMED = ("input", "damping", "rest", "seam", "imbalance")
+_SUMMED = ("input", "damping", "rest", "slip", "seam", "imbalance")
 
 
 def energy_unit(gdim: int) -> str:
@@ -34,8 +36,8 @@ def ledger(energy: Energy | None, gdim: int) -> dict[str, Any] | None:
         gdim: Dimension of the mesh.
 
     Returns:
-        ``unit``, ``input``, ``damping``, ``rest``, ``kinetic`` and ``strain`` at the start and the
-        end, ``seam``, ``imbalance``; ``None`` where there is none.
+        ``unit``, ``input``, ``damping``, ``rest``, ``slip``, ``kinetic`` and ``strain`` at the
+        start and the end, ``seam``, ``imbalance``; ``None`` where there is none.
     """
     if energy is None:
         return None
@@ -50,10 +52,10 @@ def totals(lapses: Sequence[LapseResult], gdim: int) -> dict[str, Any] | None:
         gdim: Dimension of the mesh.
 
     Returns:
-        ``unit``; sums of ``input``, ``damping``, ``rest``, ``seam`` and ``imbalance``; ``stored``
-        at the start and the end of the run; and ``worst_imbalance``, the largest imbalance of a
-        lapse over the sum of what came in or went back [-], ``None`` without any. ``None`` where a
-        lapse has no ledger.
+        ``unit``; sums of ``input``, ``damping``, ``rest``, ``slip``, ``seam`` and ``imbalance``;
+        ``stored`` at the start and the end of the run; and ``worst_imbalance``, the largest
+        imbalance of a lapse over the sum of what came in or went back [-], ``None`` without any.
+        ``None`` where a lapse has no ledger.
     """
     energies = [lapse.energy for lapse in lapses if lapse.energy is not None]
     if not energies or len(energies) < len(lapses):

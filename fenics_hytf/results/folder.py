@@ -36,7 +36,7 @@ LOCK = ".hytf.lock"
 CHECKPOINT = "checkpoint"
 
 _CHECKPOINTS = f"{CHECKPOINT}/*.npz"
-_SNAPSHOTS = ("points_*.vtu", "fields_*.vtu")
+_SNAPSHOTS = ("mesh.vtu", "points_*.vtu", "fields_*.vtu")
 # what a run may leave in its folder, and so what a forced run removes; nothing else is touched
 _OURS = (
     FINISHED,
@@ -48,6 +48,7 @@ _OURS = (
     "transfer.csv",
     "spectra.csv",
     "cells.csv",
+    "slip.csv",
     "histories_*.png",
     "transfer_*.png",
     "spectra_*.png",
@@ -59,6 +60,11 @@ _OURS = (
     "stiffness.png",
     "energy.png",
     "convergence.png",
+    "slip.png",
+    "mechanism.png",
+    "deformed.png",
+    "runout.png",
+    "points.gif",
     "report.html",
 )
 

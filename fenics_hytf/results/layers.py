@@ -77,9 +77,10 @@ def _column(scene: Scene, cells: CellState) -> Iterator[tuple[dict[str, Any], _M
 def _regions(
     region_names: tuple[str, ...], cells: CellState
 ) -> Iterator[tuple[dict[str, Any], _Members]]:
-    """The regions, highest first."""
+    """The regions, highest first; empty cells are in none."""
     height = cells.centroid[:, -1]
-    members = [(name, cells.region == i) for i, name in enumerate(region_names)]
+    filled = np.ones(len(height), bool) if cells.fill is None else cells.fill > 0
+    members = [(name, filled & (cells.region == i)) for i, name in enumerate(region_names)]
     there = [(name, member) for name, member in members if member.any()]
     for name, member in sorted(there, key=lambda pair: -float(height[pair[1]].mean())):
         yield {"soil": name, "elevation_m": _range(height[member])}, member

@@ -95,7 +95,7 @@ def _strata(scene: Scene, x0: RealArray | None) -> tuple[RealArray, RealArray]:
     places[:, 0] = 0.0 if x0 is None else x0[0]
     places[:, -1] = middle
     names = [region.soil for region in mesh.regions] or list(scene.soil)
-    density = np.array([scene.soil[name].density for name in names])
+    density = np.array([_density(scene, name) for name in names])
     index = mesh.region_index(places)
     # a sliver that no region covers, between the centroids of cells: it has no soil, so no weight
     return faces, np.where(index >= 0, density[index], 0.0)
@@ -104,7 +104,12 @@ def _strata(scene: Scene, x0: RealArray | None) -> tuple[RealArray, RealArray]:
 def _layers(column: Column, scene: Scene) -> tuple[RealArray, RealArray]:
     upwards = column.layers[::-1]
     faces = np.cumsum([0.0, *(layer.thickness for layer in upwards)])
-    return faces, np.array([scene.soil[layer.soil].density for layer in upwards])
+    return faces, np.array([_density(scene, layer.soil) for layer in upwards])
+
+
+def _density(scene: Scene, name: str) -> float:
+    """Density of a region [kg/m^3], nought of one without soil."""
+    return 0.0 if name in scene.mesh.empty else scene.soil[name].density
 
 
 def _crossings(polygon: RealArray, x0: float) -> list[float]:

@@ -39,6 +39,7 @@ class StoredResult:
         transfer: ``transfer.csv``, all lapses below each other.
         spectra: ``spectra.csv``.
         cells: ``cells.csv``, all lapses below each other; ``region`` holds names.
+        slip: ``slip.csv``, or ``None`` where the scene does not call for sliding.
     """
 
     folder: Path
@@ -48,6 +49,7 @@ class StoredResult:
     transfer: Table
     spectra: Table
     cells: Table
+    slip: Table | None = None
 
     def transfer_function(self, column: str, lapse: int) -> tuple[RealArray, RealArray]:
         """Amplitude of a transfer function on the solved lines of a lapse.
@@ -79,7 +81,8 @@ def read_result(folder: Path, summary: dict[str, Any] | None = None) -> StoredRe
     """
     if summary is None:
         summary = read_summary(folder)
-    return StoredResult(folder, summary, *read_tables(folder, *_TABLES))
+    tables = _TABLES if summary["sliding"] is None else (*_TABLES, "slip")
+    return StoredResult(folder, summary, *read_tables(folder, *tables))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
@@ -95,7 +98,7 @@ def read_summary(folder: Path) -> dict[str, Any]:
         ResultError: If the folder holds no finished result, or one of another format.
     """
     check_finished(folder)
-    with _readable(folder):
+    with readable(folder):
         summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
         found = summary.get("format") if isinstance(summary, dict) else None
         if found != FORMAT:
@@ -116,12 +119,12 @@ def read_tables(folder: Path, *names: str) -> list[Table]:
     Raises:
         ResultError: If one is missing or broken.
     """
-    with _readable(folder):
+    with readable(folder):
         return [read_table(folder / f"{name}.csv") for name in names]
 
 
 @contextmanager
-def _readable(folder: Path) -> Iterator[None]:
+def readable(folder: Path) -> Iterator[None]:
     """Turn what can go wrong with a file into a message that says what to do."""
     try:
         yield

@@ -21,6 +21,7 @@ from fenics_hytf.motion import GRAVITY, Intensity, energy_band, intensity_measur
 from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.energy import ledger, totals, worst_seam_error
 from fenics_hytf.results.layers import layer_states
+from fenics_hytf.results.sliding import slide, slip_record, slip_warnings
 from fenics_hytf.results.writers import QUANTITIES, base_motions
 from fenics_hytf.soil import HELD_DAMPING, LimitedCurve
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
     from fenics_hytf.simulation import Result
 
-FORMAT = 3
+FORMAT = 4
 """Raised when a key of the summary changes its meaning, or one that is read is new."""
 
 _SEAM_ERROR = 0.01  # of the peaks; seams of sound lapses are some 1e-4 off
@@ -80,6 +81,7 @@ def summarise(result: Result) -> dict[str, Any]:
         "lapses": [_lapse(result, lapse) for lapse in result.lapses],
         "worst_seam_error": worst_seam_error(result.lapses),
         "energy": totals(result.lapses, _gdim(result)),
+        "sliding": slide(result),
         "peaks": _peaks(result),
         "intensity": _intensity(result),
         "work": work,
@@ -118,6 +120,7 @@ def warnings(result: Result) -> list[str]:
             )
     found += _exceeded_strengths(result)
     found += _seam_warnings(result)
+    found += slip_warnings(result)
     return found
 
 
@@ -348,6 +351,7 @@ def _lapse(result: Result, lapse: LapseResult) -> dict[str, Any]:
         "seam_error": lapse.seam_error,
         "energy": ledger(lapse.energy, _gdim(result)),
         "degradation": None if degradation is None else np.nanmin(degradation),
+        "slip": slip_record(result.scene, lapse),
         "points_lost": lapse.ledger.deleted,
         "points_parked": lapse.ledger.parked,
         "mass_ledger": lapse.ledger.as_dict(),

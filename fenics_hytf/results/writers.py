@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The tables of a result as CSV: histories, base, transfer functions, response spectra, cells.
+"""The tables of a result as CSV: histories, base, transfer functions, spectra, cells, slip.
 
 Numbers are written with the fewest digits that give back the same double. A number that does not
 exist (not finite) is an empty field. Rows are written in blocks; no file is ever a string.
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from fenics_hytf.motion import default_periods, response_spectrum
 from fenics_hytf.results.overburden import vertical_stress
+from fenics_hytf.results.sliding import slip_columns
 
 if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
@@ -42,6 +43,8 @@ _BLOCK = 2048  # rows formatted at once
 def write_tables(folder: Path, result: Result) -> None:
     """Write the tables: ``receivers``, ``base``, ``transfer``, ``spectra`` and ``cells.csv``.
 
+    Where the scene calls for sliding, ``slip.csv`` too.
+
     Args:
         folder: Where.
         result: The simulation.
@@ -51,6 +54,10 @@ def write_tables(folder: Path, result: Result) -> None:
     _write_table(folder / "transfer.csv", *_transfer(result))
     _write_table(folder / "spectra.csv", *_spectra(result))
     _write_table(folder / "cells.csv", *_cells(result))
+    if result.scene.effects.sliding is not None:
+        slip = slip_columns(result)
+        slip["lapse"] = slip["lapse"].astype(int)
+        _write_table(folder / "slip.csv", list(slip), _rows(slip.values()))
 
 
 Rows = Iterator[list[Any]]
@@ -175,33 +182,38 @@ CELL_VALUES = (
 )
 """Columns of ``cells.csv`` after the place: of a cell's state, and what the overburden adds.
 
-Where cycles degrade soils ``degradation`` follows.
+``degradation`` follows where cycles degrade soils, ``fill`` where cells may be empty, and
+``mechanism_strain``, the shear strain of a metre of slip [1/m], where soil slides.
 """
 
 
 def _cells(result: Result) -> tuple[list[str], Rows]:
-    """Values of the cells, one block a lapse."""
-    centroid = result.lapses[0].cells.centroid
+    """Values of the cells, one block a lapse; empty cells have none and are left out."""
+    first = result.lapses[0]
+    centroid = first.cells.centroid
     places = ["x", "y", "z"][: centroid.shape[1]]
     names = np.array(result.region_names, dtype=object)
     overburden = vertical_stress(result.scene, centroid)
     columns: tuple[str, ...] = CELL_VALUES
-    if result.lapses[0].cells.degradation is not None:
-        columns += ("degradation",)
+    columns += tuple(n for n in ("degradation", "fill") if getattr(first.cells, n) is not None)
+    if first.slip is not None:
+        columns += ("mechanism_strain",)
 
     def block(lapse: LapseResult) -> Rows:
         cells = lapse.cells
-        count = cells.region.size
+        filled = np.flatnonzero(np.ones(len(centroid)) if cells.fill is None else cells.fill)
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.where(overburden > 0.0, cells.peak_stress / overburden, np.nan)
         values = vars(cells) | {"vertical_stress": overburden, "stress_ratio": ratio}
+        if lapse.slip is not None:
+            values["mechanism_strain"] = lapse.slip.shear_strain
         return _rows(
             [
-                np.full(count, lapse.index),
-                np.arange(count),
-                names[cells.region],
-                *centroid.T,
-                *(values[name] for name in columns),
+                np.full(len(filled), lapse.index),
+                filled,
+                names[cells.region[filled]],
+                *centroid[filled].T,
+                *(values[name][filled] for name in columns),
             ]
         )
 

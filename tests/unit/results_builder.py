@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from fenics_hytf.lapse.energy import Energy
-from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory
+from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory, SlipResult
 from fenics_hytf.particles import MassLedger
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Result, Snapshot, Work
@@ -113,6 +113,125 @@ def make_result(directions=("x",), lapses=1, loop=True, gdim=2, kind="column", *
         ),
         peak_memory=300 * 2**20,
     )
+
+
+SLIDES = {"gravity": {"acceleration": 10.0}, "sliding": True, "convection": True}
+AIR = [[20.0, 14.0], [40.0, 14.0], [40.0, 24.0], [20.0, 24.0]]
+SLIPS = (0.0, 0.3, 0.1, 0.0)
+SAMPLES = (60, 30, 60, 120)  # of a record of 240: a lapse is cut, and one goes on after the end
+
+
+def make_slide(slips=SLIPS, yields=(0.1, 0.11, 0.12, 0.13), end_rate=0.0, gdim=2, **more):
+    """A box that slides along +x in some lapses; in two dimensions with air in a corner.
+
+    Slip grows as half a period of a cosine over each lapse, from rest to rest but for ``end_rate``
+    [m/s]; the driving acceleration is a sine of 3 m/s^2, k_y g 1 m/s^2 and more. Lapse 0 finds cell
+    0 empty besides.
+    """
+    soil = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "cohesion": 2e4}
+    if gdim == 2:
+        size, cells = [40.0, 24.0], [20, 12]
+        regions = [
+            {"soil": "air", "polygon": AIR},
+            {"soil": "sand", "below": 20.0},
+            {"soil": "fill"},
+        ]
+        mesh = {"box": {"size": size, "cells": cells}, "regions": regions, "empty": ["air"]}
+        more = {"mesh": mesh, **more}
+    given = {"kind": "box", "loop": False, "effects": SLIDES, "soil": {"sand": soil, "fill": soil}}
+    result = make_result(lapses=len(slips), gdim=gdim, **(given | more))
+    lapses, start = [], 0
+    for lapse, slip, k_y, count in zip(result.lapses, slips, yields, SAMPLES, strict=False):
+        last = lapse.index == len(slips) - 1
+        lapse = _resized(lapse, count, start)
+        fill = np.ones(len(lapse.cells.region))
+        fill[(lapse.cells.centroid[:, 0] > 20.0) & (lapse.cells.centroid[:, -1] > 14.0)] = 0.0
+        fill[0] = float(lapse.index > 0)
+        cells = replace(lapse.cells, fill=fill)
+        record = _slip(lapse, slip, k_y, end_rate if last else 0.0)
+        lapses.append(replace(lapse, cells=cells, slip=record))
+        start += count
+    base = result.base_acceleration
+    base = np.pad(base, ((0, 0), (0, max(0, start - base.shape[1]))))
+    return replace(result, lapses=tuple(lapses), base_acceleration=base)
+
+
+def make_slide_snapshot(result, index, fields=False):
+    """A point in the middle of every cell; those above 10 m move with the slip, up to 1 m ahead."""
+    cells = result.lapses[index].cells
+    gdim = cells.centroid.shape[1]
+    start = cells.centroid[result.lapses[0].cells.fill > 0]
+    came = sum(lapse.slip.slip[-1] for lapse in result.lapses[: index + 1])
+    u = np.zeros_like(start)
+    high = start[:, -1] > 10.0
+    u[high, 0], u[high, -1] = came, -0.5 * came
+    size = 2.0 ** gdim if gdim == 2 else 5.0 * 5.0 * 2.0
+    points = {
+        "position": start + u,
+        "displacement": u,
+        "volume": np.full(len(start), size),
+        "id": np.arange(len(start)),
+        "stress": np.outer(start[:, -1], np.arange(1.0, 3.0 * gdim - 2.0)),
+        "g_over_gmax": np.ones(len(start)),
+    }
+    vertices, corners = _box_mesh(gdim)
+    state = {"fill": cells.fill, "shear_modulus": cells.shear_modulus} if fields else {}
+    kind = "quad" if gdim == 2 else "hexahedron"
+    end = result.lapses[index].start_time + result.lapses[index].num_samples * result.dt
+    at_vertices = {"displacement": vertices} if fields else {}
+    return Snapshot(
+        index, end, points, vertices, corners, kind, at_vertices, state, with_mesh=True
+    )
+
+
+def _slip(lapse, slip, k_y, end_rate):
+    steps = 2 * lapse.num_samples + 1
+    time = np.linspace(0.0, 1.0, steps)
+    length = lapse.num_samples * lapse.dt
+    rate = 0.5 * np.pi * slip / length * np.sin(np.pi * time)
+    rate[[0, -1]] = 0.0, end_rate
+    return SlipResult(
+        yield_coefficient=k_y,
+        factor_of_safety=1.5,
+        direction="x",
+        sense=1,
+        time_step=0.5 * lapse.dt,
+        slip=0.5 * slip * (1.0 - np.cos(np.pi * time)),
+        rate=rate,
+        driving=3.0 * np.sin(2.0 * np.pi * time),
+        rigid=0.5 * slip,
+        decoupled=2.0 * slip,
+        mass=2e5,
+        modal_mass=1.5e5,
+        dissipation=4e5,
+        shear_strain=0.01 * (1 + lapse.index) * np.arange(len(lapse.cells.region)),
+        iterations=20 + lapse.index,
+    )
+
+
+def _resized(lapse, count, start):
+    """A lapse of another length: cut, or with zeros after its end."""
+
+    def fit(values):
+        missing = max(0, count - values.shape[-1])
+        return np.pad(values[..., :count], [(0, 0)] * (values.ndim - 1) + [(0, missing)])
+
+    names = ("displacement", "velocity", "acceleration", "total_acceleration", "within")
+    histories = {name: fit(getattr(lapse, name)) for name in names}
+    return replace(lapse, num_samples=count, start_time=start * lapse.dt, **histories)
+
+
+def _box_mesh(gdim):
+    """Vertices and cells in VTK order of the boxes here, cells as their centroids are ordered."""
+    grids = ([20, 12], [40.0, 24.0]) if gdim == 2 else ([8, 6, 12], [40.0, 30.0, 24.0])
+    ticks = [np.linspace(0.0, size, n + 1) for n, size in zip(*grids, strict=True)]
+    vertices = np.column_stack([a.ravel() for a in np.meshgrid(*ticks, indexing="ij")])
+    number = np.arange(len(vertices)).reshape([n + 1 for n in grids[0]])
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    corners = square if gdim == 2 else [(*xy, z) for z in (0, 1) for xy in square]
+    block = [number[tuple(slice(c, n + c) for c, n in zip(corner, grids[0], strict=True))].ravel()
+             for corner in corners]  # fmt: skip
+    return vertices, np.column_stack(block)
 
 
 def make_snapshot(index=0, fields=True, gdim=2):

@@ -261,6 +261,7 @@ def test_energy_of_lapses_and_of_the_run(tmp_path, gdim):
             "input": energy.input,
             "damping": energy.damping,
             "rest": energy.rest,
+            "slip": 0.0,
             "kinetic": list(energy.kinetic),
             "strain": list(energy.strain),
             "seam": energy.seam,

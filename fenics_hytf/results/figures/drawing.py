@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from fenics_hytf.results.figures import style
+from fenics_hytf.results.figures.animation import animate
 from fenics_hytf.results.figures.convergence import convergence
 from fenics_hytf.results.figures.energy import energy_balance
 from fenics_hytf.results.figures.histories import base_motions, histories
+from fenics_hytf.results.figures.plane import plane_of
 from fenics_hytf.results.figures.profiles import caption, peak_profiles, profiles
 from fenics_hytf.results.figures.section import section
 from fenics_hytf.results.figures.shown import (
@@ -23,6 +25,16 @@ from fenics_hytf.results.figures.shown import (
     seams,
     shown_components,
     solved_band,
+    without_slip,
+)
+from fenics_hytf.results.figures.slip import slip_caption, slip_history
+from fenics_hytf.results.figures.slope import (
+    RUN_OUT_CAPTION,
+    deformed,
+    mechanism,
+    mechanism_caption,
+    moves,
+    run_out,
 )
 from fenics_hytf.results.figures.spectra import (
     fourier_amplitudes,
@@ -41,14 +53,22 @@ class Drawing:
         file: Its name in the result folder.
         title: Heading.
         caption: What it shows, and how to read it.
-        part: Where it belongs in the report: ``base``, ``motion``, ``ground``, ``seams`` or
-            ``loop``.
+        part: Where it belongs in the report: ``base``, ``motion``, ``sliding``, ``ground``,
+            ``seams`` or ``loop``.
     """
 
     file: str
     title: str
     caption: str
     part: str
+
+
+ANIMATION = Drawing(
+    "points.gif",
+    "The points as they slide",
+    "A frame for every lapse after which points were written; many are thinned.",
+    "sliding",
+)
 
 
 def draw_figures(stored: StoredResult) -> list[Drawing]:
@@ -65,6 +85,10 @@ def draw_figures(stored: StoredResult) -> list[Drawing]:
         for figure, drawing in all_figures(stored):
             style.save(figure, stored.folder / drawing.file)
             drawings.append(drawing)
+        plane = plane_of(stored)
+        if plane is not None and moves(stored):
+            animate(stored, plane, stored.folder / ANIMATION.file)
+            drawings.append(ANIMATION)
     return drawings
 
 
@@ -93,6 +117,8 @@ def all_figures(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
     if band is not None:
         for component in components:
             yield _fourier(stored, component, band)
+    if stored.slip is not None:
+        yield from _sliding(stored)
     yield from _ground(stored)
     if stored.summary["energy"] is not None:
         yield _energy(stored)
@@ -164,6 +190,22 @@ def _fourier(
     )
 
 
+def _sliding(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
+    """The mechanism, the slip, and the ground that has moved with it."""
+    plane = plane_of(stored)
+    if plane is not None:
+        drawing = Drawing("mechanism.png", "Mechanism", mechanism_caption(stored), "sliding")
+        yield mechanism(stored, plane), drawing
+    drawing = Drawing("slip.png", "Slip over time", slip_caption(stored), "sliding")
+    yield slip_history(stored), drawing
+    if plane is None or not moves(stored):
+        return
+    text = "Material points where they came to, as large as the soil they stand for, over the mesh."
+    drawing = Drawing("deformed.png", "Ground that has slid", text, "sliding")
+    yield deformed(stored, plane), drawing
+    yield run_out(stored, plane), Drawing("runout.png", "Run-out", RUN_OUT_CAPTION, "sliding")
+
+
 def _ground(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
     """Profiles and maps of what the ground went through."""
     how = caption(stored)
@@ -177,6 +219,7 @@ def _ground(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
         text = "Cell values contoured between the cells' centres."
         if len(stored.summary["lapses"]) > 1:
             text += " Over all lapses: the largest, of G/Gmax the smallest."
+        text += without_slip(stored)
         yield maps, Drawing("section.png", "Section", text, "ground")
     softened = stiffness(stored)
     if softened is not None:
@@ -189,6 +232,11 @@ def _energy(stored: StoredResult) -> tuple[Figure, Drawing]:
         "Input is the work of the base's acceleration on the mass that moves relative to it. "
         "Summed up to the end of each lapse, straight in between."
     )
+    if stored.slip is not None:
+        text += (
+            " A mechanism that slips takes Q_y λ more than gravity brings it; where it yields "
+            "under its weight alone gravity brings more than it takes."
+        )
     if len(stored.summary["lapses"]) > 1:
         text += (
             " Where moduli change at a seam the energy in the springs jumps, and stress that the "

@@ -44,26 +44,31 @@ def energy_balance(stored: StoredResult) -> Figure:
 
 def _course(axes: Axes, time: RealArray, ledgers: list[dict[str, Any]], factor: float) -> None:
     """Sums up to the end of each lapse; stored energy as it is there."""
-    lost = _so_far(ledgers, "damping")
+    lost, slipped = (_so_far(ledgers, name) for name in ("damping", "slip"))
     strain, kinetic = (
         np.array([ledgers[0][name][0], *(energy[name][1] for energy in ledgers)])
         for name in ("strain", "kinetic")
     )
-    axes.stackplot(
-        time,
-        *(factor * part for part in (lost, strain, kinetic)),
-        labels=("lost in damping", "stored as strain", "stored in motion"),
-        colors=[COLOURS[4], COLOURS[5], COLOURS[2]],
-        alpha=0.75,
-        linewidth=0.0,
-    )
+    parts = [
+        (lost, "lost in damping", COLOURS[4]),
+        (np.maximum(slipped, 0.0), "lost in sliding", COLOURS[3]),
+        (strain, "stored as strain", COLOURS[5]),
+        (kinetic, "stored in motion", COLOURS[2]),
+    ]
+    if not np.any(slipped > 0.0):
+        del parts[1]
+    values, labels, colours = zip(*parts, strict=True)
+    scaled = [factor * part for part in values]
+    axes.stackplot(time, *scaled, labels=labels, colors=colours, alpha=0.75, linewidth=0.0)
     come = factor * _so_far(ledgers, "input")
     marker = "o" if len(ledgers) <= _MARKED else "none"
     [line] = axes.plot(time, come, color=INK, marker=marker, markersize=3.5, label="input")
     line.set_clip_on(False)
-    seams = factor * (_so_far(ledgers, "seam") - _so_far(ledgers, "rest"))
-    if np.any(seams):
-        axes.plot(time, come + seams, color=COLOURS[1], linestyle=DASHED, label="input and seams")
+    fallen = np.maximum(-slipped, 0.0)  # what gravity brings beyond what the mechanism takes
+    besides = factor * (_so_far(ledgers, "seam") - _so_far(ledgers, "rest") + fallen)
+    if np.any(besides):
+        text = "input, seams\nand gravity" if np.any(fallen) else "input and seams"
+        axes.plot(time, come + besides, color=COLOURS[1], linestyle=DASHED, label=text)
     axes.set_ylim(bottom=min(0.0, 1.05 * come.min()))
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(

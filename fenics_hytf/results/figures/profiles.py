@@ -19,6 +19,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fenics_hytf.motion import GRAVITY
+from fenics_hytf.results.figures.shown import without_slip
 from fenics_hytf.results.figures.style import COLOURS, MAX_LINES, QUIET, label, length_unit
 from fenics_hytf.results.reader import StoredResult
 
@@ -75,7 +76,7 @@ def caption(stored: StoredResult) -> str:
         text += " Over all lapses: the largest of each, of G/Gmax the smallest."
     if stored.summary["scene"]["mesh"]["kind"] != "column":
         text += " Dots: cells; lines: median of a region in bins of height."
-    return text
+    return text + without_slip(stored)
 
 
 def is_linear(stored: StoredResult) -> bool:
@@ -94,13 +95,17 @@ def envelope(stored: StoredResult, name: str) -> RealArray:
         In the column's unit, shape ``(num_cells,)``.
     """
     extreme = np.fmin if name == "g_over_gmax" else np.fmax
-    column = stored.cells[name]
-    return np.asarray(extreme.reduce([column[rows] for rows in _lapse_rows(stored)]), np.float64)
+    cells, column = np.unique(stored.cells["cell"], return_inverse=True)
+    lapses, row = np.unique(stored.cells["lapse"], return_inverse=True)
+    values = np.full((len(lapses), len(cells)), np.nan)  # a cell may be empty in a lapse
+    values[row, column] = stored.cells[name]
+    return np.asarray(extreme.reduce(values))
 
 
 def cell_column(stored: StoredResult, name: str) -> npt.NDArray[Any]:
-    """A column of ``cells.csv`` that is the same in all lapses, shape ``(num_cells,)``."""
-    return np.asarray(stored.cells[name][_lapse_rows(stored)[0]])
+    """A column of ``cells.csv``, of each cell in its first lapse, shape ``(num_cells,)``."""
+    _, first = np.unique(stored.cells["cell"], return_index=True)
+    return np.asarray(stored.cells[name][first])
 
 
 def _stress(stored: StoredResult) -> _Panel:
@@ -131,12 +136,6 @@ def _draw(stored: StoredResult, panels: Sequence[_Panel]) -> Figure:
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=min(len(labels), 4) or 1)
     return figure
-
-
-def _lapse_rows(stored: StoredResult) -> list[npt.NDArray[np.intp]]:
-    """Rows of ``cells.csv`` of each lapse."""
-    lapse = stored.cells["lapse"]
-    return [np.flatnonzero(lapse == index) for index in np.unique(lapse)]
 
 
 def _column_edges(stored: StoredResult, height: RealArray) -> RealArray | None:

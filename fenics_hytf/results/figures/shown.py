@@ -83,6 +83,13 @@ def left_out(stored: StoredResult) -> str:
     return f" {MAX_LINES} of {count} receivers are shown." if count > MAX_LINES else ""
 
 
+def without_slip(stored: StoredResult) -> str:
+    """Words for a caption of strain where ground slides."""
+    if stored.slip is None:
+        return ""
+    return " Strain is that of the vibration; what slips strains the ground besides."
+
+
 def on_contour(stored: StoredResult) -> str:
     """Words for a caption where lines lie on a damped contour."""
     contour = stored.summary["scene"]["contour"]

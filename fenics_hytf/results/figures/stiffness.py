@@ -68,8 +68,12 @@ def stiffness_caption(stored: StoredResult) -> str:
 
 def _softest(stored: StoredResult, name: str) -> RealArray:
     """Smallest value of each layer, NaN where it has none, shape ``(num_lapses, num_layers)``."""
-    layers = [lapse["layers"] for lapse in stored.summary["lapses"]]
-    values = [[(layer[name] or [None])[0] for layer in of_lapse] for of_lapse in layers]
+    lapses = [
+        {_name(layer): (layer[name] or [None])[0] for layer in lapse["layers"]}
+        for lapse in stored.summary["lapses"]
+    ]
+    # where soil moves, regions come in another order, or come to fill most of no cell
+    values = [[lapse.get(layer) for layer in lapses[0]] for lapse in lapses]
     return np.array(values, dtype=np.float64)
 
 

@@ -109,6 +109,19 @@ def length_unit(peak: float) -> tuple[float, str]:
     return (1e3, "mm") if peak == 0.0 else (1e6, "µm")
 
 
+def spread(count: int, most: int) -> list[int]:
+    """Which of many to show: the first, the last, and others evenly between them.
+
+    Args:
+        count: How many there are.
+        most: How many are shown at most.
+
+    Returns:
+        Their numbers from 0, ascending.
+    """
+    return [int(i) for i in np.linspace(0, count - 1, min(count, most)).round()]
+
+
 def chosen(names: Sequence[str], heights: Sequence[float]) -> list[int]:
     """Which of many to draw: at most ``MAX_LINES``, spread evenly from the highest to the lowest.
 
@@ -122,5 +135,4 @@ def chosen(names: Sequence[str], heights: Sequence[float]) -> list[int]:
     order = sorted(range(len(names)), key=lambda i: -heights[i])
     if len(order) <= MAX_LINES:
         return order
-    places = np.linspace(0, len(order) - 1, MAX_LINES).round().astype(int)
-    return [order[place] for place in places]
+    return [order[place] for place in spread(len(order), MAX_LINES)]

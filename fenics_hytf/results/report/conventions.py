@@ -52,8 +52,8 @@ def method(summary: Summary) -> list[str]:
     Returns:
         Paragraphs of plain text.
     """
-    parts = (_analysis, _soil, _modulus, _base, _sides, _lines, _quantities)
-    return [" ".join(part(summary)) for part in parts]
+    parts = (_analysis, _soil, _modulus, _sliding, _base, _sides, _lines, _quantities)
+    return [text for part in parts if (text := " ".join(part(summary)))]
 
 
 def rock_words(rock: Mapping[str, float]) -> str:
@@ -73,18 +73,21 @@ def _analysis(summary: Summary) -> Iterator[str]:
     )
     if summary["scene"]["mesh"]["kinematics"] == "antiplane":
         yield "The section moves across its plane (SH waves)."
-    length = lapses[0]["samples"] * summary["dt_s"]
+    lengths = sorted(lapse["samples"] * summary["dt_s"] for lapse in lapses)
+    length = f"{lengths[0]:g}"
     scheme = summary["scene"]["scheme"]
     if len(lapses) == 1:
         yield (
-            f"The analysed time of {length:g} s is taken as one period of a motion that repeats "
+            f"The analysed time of {length} s is taken as one period of a motion that repeats "
             "itself; quiet at its end lets the response die out."
             if scheme == "steady"
-            else f"The analysed {length:g} s begin at rest."
+            else f"The analysed {length} s begin at rest."
         )
         return
+    if summary["sliding"] is not None and lengths[-1] > lengths[0]:
+        length += f" to {lengths[-1]:g}"
     yield (
-        f"The motion is cut into {len(lapses)} lapses of {length:g} s. Stiffness and damping are "
+        f"The motion is cut into {len(lapses)} lapses of {length} s. Stiffness and damping are "
         "constant within a lapse and found anew for the next."
     )
     yield {
@@ -176,6 +179,35 @@ def _maxwell(scene: Mapping[str, Any]) -> Iterator[str]:
     yield f"Above D = {HELD_DAMPING:g} four branches no longer hold the loss factor."
     if scene["rock"] is not None:
         yield "The dashpots of the base are real, ρV: damping in the rock is left out."
+
+
+def _sliding(summary: Summary) -> Iterator[str]:
+    settings = summary["scene"]["sliding"]
+    if settings is None:
+        return
+    yield (
+        "Permanent displacement is that of a mechanism: the flow of the ground that yields first "
+        "under its weight and a push downslope of k_y times its weight, found for every lapse by "
+        "iterations with a secant modulus (linear matching; Ponter and Carter, 1997). Shear "
+        "strength is that of Mohr and Coulomb under the mean stress as the lapse begins; flow "
+        "keeps its volume. k_y is an upper bound, and so is the factor of safety at rest, sought "
+        "in the same way. In a lapse the ground moves by its vibration and by the slip λ(t) of the "
+        "mechanism, λ being the displacement of the place that moves farthest. It slips, one way, "
+        "whenever the force that drives it would exceed what it yields under, and its slip acts "
+        f"back on the vibration, in steps of {1e3 * settings['time_step']:g} ms at most."
+    )
+    if "convection" in summary["effects"]:
+        yield (
+            "A lapse ends early, and a new mechanism is sought, where the slip in it comes to "
+            f"{settings['new_mechanism']:g} of the smallest edge of a cell."
+        )
+    yield (
+        "Lapses go on after the motion until nothing slips, for at most "
+        f"{settings['longest']:g} s. Mechanisms that compete, go back and forth or eat their way "
+        "upslope are not in the method, nor is pore pressure. PGD, which takes the motion as one "
+        "that repeats itself, says nothing about ground that slides: its displacement is in the "
+        "table of peaks."
+    )
 
 
 def _base(summary: Summary) -> Iterator[str]:

@@ -26,6 +26,7 @@ from fenics_hytf.results.report.findings import (
 from fenics_hytf.results.report.input import input_section
 from fenics_hytf.results.report.markup import number, paragraphs, section, text
 from fenics_hytf.results.report.seams import seams_section
+from fenics_hytf.results.report.sliding import sliding_section
 from fenics_hytf.results.report.style import STYLE
 from fenics_hytf.results.report.work import work_section
 from fenics_hytf.results.summary import component_peaks
@@ -57,7 +58,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
     title = summary["title"] or "Ground response"
     figures = {
         part: "\n".join(_figure(stored, drawing) for drawing in drawings if drawing.part == part)
-        for part in ("base", "motion", "ground", "seams", "loop")
+        for part in ("base", "motion", "sliding", "ground", "seams", "loop")
     }
     body = [
         f"<header><h1>{escape(title)}</h1>{_byline(summary)}</header>",
@@ -72,6 +73,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
             intensity_table(summary),
             figures["motion"],
         ),
+        sliding_section(stored, figures["sliding"]),
         section("Strain, stress and stiffness", figures["ground"]),
         seams_section(summary, figures["seams"]),
         _convergence(stored, figures["loop"]),
@@ -101,7 +103,7 @@ def _byline(summary: Summary) -> str:
 
 
 def _key_figures(summary: Summary) -> str:
-    """What is asked for first: input, base, largest response."""
+    """What is asked for first: input, largest response, slip, base."""
     figures = [
         (f"input {m['direction']}, {m['input']}, PGA", f"{number(m['pga_g'])} g")
         for m in summary["motions"]
@@ -111,11 +113,16 @@ def _key_figures(summary: Summary) -> str:
         for component, peak in component_peaks(summary).items()
         if component in summary["directions"] and peak > 0.0
     ]
+    sliding = summary["sliding"]
+    if sliding is not None:
+        figures.append(("slip", f"{number(sliding['slip_m'])} m"))
+        figures.append(("factor of safety at rest", number(sliding["factor_of_safety"])))
     layers = [layer for lapse in summary["lapses"] for layer in lapse["layers"]]
     strain = max((i["effective_strain"][1] or 0.0 for i in layers), default=0.0)
     stiffness = min((i["g_over_gmax"][0] or 1.0 for i in layers), default=1.0)
     if summary["scene"]["strain_ratio"] is None:
-        figures.append(("largest shear strain", f"{number(100 * strain)} %"))
+        name = "largest shear strain" + ("" if sliding is None else ", without slip")
+        figures.append((name, f"{number(100 * strain)} %"))
     else:
         figures.append(("largest effective strain", f"{number(100 * strain)} %"))
         figures.append(("smallest G/Gmax", number(stiffness)))
@@ -136,9 +143,12 @@ def _warnings(warnings: Sequence[str]) -> str:
 
 
 def _figure(stored: StoredResult, drawing: Drawing) -> str:
-    data = base64.b64encode((stored.folder / drawing.file).read_bytes()).decode("ascii")
+    file = stored.folder / drawing.file
+    data = base64.b64encode(file.read_bytes()).decode("ascii")
+    lazy = ' loading="lazy"' if file.suffix == ".gif" else ""
+    source = f"data:image/{file.suffix[1:]};base64,{data}"
     return (
-        f'<figure><img alt="{text(drawing.title)}" src="data:image/png;base64,{data}">'
+        f'<figure><img alt="{text(drawing.title)}"{lazy} src="{source}">'
         f"<figcaption><strong>{text(drawing.title)}.</strong> {text(drawing.caption)}</figcaption>"
         "</figure>"
     )

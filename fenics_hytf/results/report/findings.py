@@ -27,6 +27,30 @@ _ROUNDING = 1e-9  # of the largest of a kind
 _MOST_LAPSES = 6  # whose layers are listed
 
 
+def what_slid(summary: Summary) -> str:
+    """What the slope did, in one line."""
+    told, lapse = summary["sliding"], summary["lapses"][-1]
+    safety = f"its factor of safety at rest was {number(told['factor_of_safety'])}"
+    if not told["slip_m"] > 0.0:
+        ratio = told["yield_over_peak"]
+        drive = (
+            "nothing drove it"
+            if ratio is None
+            else (f"it was driven by {100 / ratio:.2g} % of the acceleration that it yields under")
+        )
+        return f"The slope did not slide: {safety}, and {drive}."
+    first = lapse["slip"]
+    way = f"{'+' if first['sense'] > 0 else '−'}{first['direction']}"
+    slid = f"The slope slid by {number(told['slip_m'])} m towards {way}"
+    if told["at_rest_s"] is None:
+        end = lapse["start_time_s"] + lapse["samples"] * summary["dt_s"]
+        return (
+            f"{slid}, and was still sliding at {number(first['end_rate_m_s'])} m/s when the run "
+            f"ended after {end:.3g} s; {safety}."
+        )
+    return f"{slid} and came to rest after {told['at_rest_s']:.3g} s; {safety}."
+
+
 def base_table(summary: Summary) -> str:
     """Intensity of the motions of the base, within and outcrop."""
     given = {motion["direction"]: motion["input"] for motion in summary["motions"]}
@@ -151,16 +175,17 @@ def layers_table(summary: Summary) -> str:
 def iterations_table(stored: StoredResult) -> str:
     """Largest change of every iteration, and the cell it was in; of the longest loop."""
     lapse = max(stored.summary["lapses"], key=lambda lapse: lapse["iterations"])
-    cells = stored.cells
-    start = int(np.argmax(cells["lapse"] == lapse["index"]))
-    height = cells["z" if "z" in cells else "y"][start:]
+    here = stored.cells["lapse"] == lapse["index"]
+    cells = {name: column[here] for name, column in stored.cells.items()}
+    height = cells["z" if "z" in cells else "y"]
+    rows_of = np.searchsorted(cells["cell"], lapse["worst_cell"])
     layers = stored.summary["scene"]["mesh"].get("layers")
     if layers is not None:
         height = sum(layer["thickness_m"] for layer in layers) - height
     rows = [
-        (i, power(change), cell, f"{height[cell]:g}", cells["region"][start + cell])
-        for i, (change, cell) in enumerate(
-            zip(lapse["change"], lapse["worst_cell"], strict=True), 1
+        (i, power(change), cell, f"{height[row]:g}", cells["region"][row])
+        for i, (change, cell, row) in enumerate(
+            zip(lapse["change"], lapse["worst_cell"], rows_of, strict=True), 1
         )
     ]
     which = f" of lapse {lapse['index']}" if len(stored.summary["lapses"]) > 1 else ""

@@ -10,6 +10,8 @@ from fenics_hytf.results.report.markup import NOTHING, definitions, number, sect
 
 Summary = Mapping[str, Any]
 
+_STRENGTH = ("Cohesion [kPa]", "Friction angle [°]")
+
 
 def input_section(summary: Summary) -> str:
     """The section on the input.
@@ -48,6 +50,7 @@ def _soils(summary: Summary) -> str:
         "G [MPa]",
         "Poisson's ratio [-]",
         "Damping [%]",
+        *(_STRENGTH if summary["sliding"] else ()),
         "Curves of G/Gmax and damping",
     )
     scene = summary["scene"]
@@ -59,6 +62,7 @@ def _soils(summary: Summary) -> str:
             number(soil["shear_modulus_pa"] / 1e6, 4),
             f"{soil['poisson']:g}",
             number(100 * soil["damping"]),
+            *(_strength(soil) if summary["sliding"] else ()),
             soil["curves"] or NOTHING,
         )
         for name, soil in scene["soils"].items()
@@ -74,10 +78,16 @@ def _soils(summary: Summary) -> str:
                 number(density * velocity**2 / 1e6, 4),
                 f"{rock['poisson']:g}",
                 number(100 * rock["damping"]),
+                *((NOTHING,) * len(_STRENGTH) if summary["sliding"] else ()),
                 NOTHING,
             )
         )
-    return table("Soils, at small strain.", head, rows, words=(0, 6))
+    return table("Soils, at small strain.", head, rows, words=(0, len(head) - 1))
+
+
+def _strength(soil: Mapping[str, Any]) -> tuple[str, ...]:
+    """Cohesion [kPa] and friction angle [°]; what is not given is nought."""
+    return number((soil["cohesion_pa"] or 0.0) / 1e3), number(soil["friction_angle_degrees"] or 0.0)
 
 
 def _motions(summary: Summary) -> str:
@@ -134,6 +144,17 @@ def _settings(summary: Summary) -> list[tuple[str, str]]:
             f"s {degradation['s']:g}, r {degradation['r']:g}, not below {degradation['minimum']:g}"
         )
         settings.insert(1, ("Degradation", text))
+    if scene["gravity"] is not None:
+        stress = scene["gravity"]["initial_stress"]
+        first = "" if stress is None else f", initial stress {stress}"
+        settings.insert(1, ("Gravity", f"{scene['gravity']['acceleration']:g} m/s²{first}"))
+    if scene["sliding"] is not None:
+        sliding = scene["sliding"]
+        text = f"steps of {1e3 * sliding['time_step']:g} ms at most"
+        if "convection" in summary["effects"]:
+            text += f", a new mechanism after {sliding['new_mechanism']:g} of a cell"
+        text += f", at most {sliding['longest']:g} s beyond the motion"
+        settings.insert(1, ("Sliding", text))
     if scene["rayleigh"] is not None:
         text = f"alpha {scene['rayleigh']['alpha']:g} 1/s, beta {scene['rayleigh']['beta']:g} s"
         settings.insert(1, ("Rayleigh damping", text))

@@ -10,6 +10,8 @@ from fenics_hytf.results.report.markup import NOTHING, number, paragraphs, power
 
 Summary = Mapping[str, Any]
 
+_ROUNDING = 1e-9  # of the largest energy
+
 
 def seams_section(summary: Summary, figure: str) -> str:
     """The section on seams and energy.
@@ -41,7 +43,9 @@ def _words(summary: Summary) -> Iterator[str]:
         f"{number(energy['input'])} {energy['unit']} came in at the base, "
         f"{_share(energy, 'damping')} of it was lost in the ground and in dashpots"
     )
-    if len(summary["lapses"]) > 1:
+    if energy["slip"]:
+        text = _slide_words(energy)
+    elif len(summary["lapses"]) > 1:
         text += (
             f", {_share(energy, 'rest')} went into stress that faded after the moduli had changed, "
             f"and jumps at the seams brought {_share(energy, 'seam')}"
@@ -53,6 +57,27 @@ def _words(summary: Summary) -> Iterator[str]:
         "The balance is that of the motion relative to the one that is given: input is "
         "−∫ a rᵀMv dt, with a the given acceleration in the direction r, v the relative velocity "
         "and M the mass. It is computed beside the response and does not close by itself."
+    )
+
+
+def _slide_words(energy: Mapping[str, Any]) -> str:
+    """Where the energy went of ground that slid; gravity may have brought most of it."""
+    largest = max(abs(energy[name]) for name in ("input", "damping", "slip", "seam"))
+
+    def amount(name: str) -> str:
+        value = energy[name] if abs(energy[name]) > _ROUNDING * largest else 0.0
+        return f"{number(abs(value) if name == 'slip' else value)} {energy['unit']}"
+
+    fell = energy["slip"] < 0
+    return (
+        f"{amount('input')} came in at the base; "
+        + (
+            f"gravity brought {amount('slip')} more than sliding took"
+            if fell
+            else f"{amount('slip')} went into sliding, beyond what gravity brought"
+        )
+        + f"; {amount('damping')} was lost in the ground and in dashpots, {amount('rest')} went "
+        f"into stress that faded, and jumps at the seams brought {amount('seam')}"
     )
 
 
@@ -68,24 +93,27 @@ def _table(summary: Summary) -> str:
     ]
     if energy is not None:
         unit = energy["unit"]
+        slides = summary["sliding"] is not None
         names = (
-            *("Input", "Lost in damping", "Into fading stress", "In motion, end"),
-            *("In strain, end", "Jump at seam", "Imbalance"),
+            *("Input", "Lost in damping", "Into fading stress"),
+            *(("Into sliding",) if slides else ()),
+            *("In motion, end", "In strain, end", "Jump at seam", "Imbalance"),
         )
         head += [f"{name} [{unit}]" for name in names]
         for row, lapse in zip(rows, lapses, strict=True):
-            row += _energies(lapse["energy"])
+            row += _energies(lapse["energy"], slides)
         if len(lapses) > 1:
-            sums = ("input", "damping", "rest", None, None, "seam")
+            sums = ("input", "damping", "rest", *(("slip",) if slides else ()), None, None, "seam")
             values = [NOTHING if name is None else number(energy[name]) for name in sums]
             rows.append(["all", "", "", *values, power(energy["imbalance"])])
     title = "Seam errors." if energy is None else "Seams and energy, lapse by lapse."
     return table(title, head, rows, words=(), dense=True)
 
 
-def _energies(energy: Mapping[str, Any]) -> list[str]:
+def _energies(energy: Mapping[str, Any], slides: bool) -> list[str]:
+    names = ("input", "damping", "rest", *(("slip",) if slides else ()))
     ends = energy["kinetic"][1], energy["strain"][1]
-    values = (energy["input"], energy["damping"], energy["rest"], *ends, energy["seam"])
+    values = (*(energy[name] for name in names), *ends, energy["seam"])
     return [*(number(value) for value in values), power(energy["imbalance"])]
 
 
