@@ -142,12 +142,17 @@ class Handover:
         self._solved = equations
         self._constant = self._constant_force(equations)
         forces = self._forces(material)
+        # Weight and the springs that bear it cancel as the ground comes to rest: they act as one.
+        lasting = forces[0].copy()
+        if self._constant is not None:
+            lasting.axpy(-1.0, self._constant)
         if self._excitation.carries:
-            sweep = solve(self._equations.with_sides(self._loads(material, forces)))
+            loads = self._loads(material, [lasting, *forces[1:]])
+            sweep = solve(self._equations.with_sides(loads))
         else:
             sweep = solve(equations.loads)
         start = self._starts(equations, material, forces)
-        for force in [*forces, *([] if self._constant is None else [self._constant])]:
+        for force in [lasting, *forces, *([] if self._constant is None else [self._constant])]:
             force.destroy()
         return Response(sweep, self._excitation, start, start_factorisations=1)
 
@@ -177,15 +182,12 @@ class Handover:
         return [*forces, rest]
 
     def _loads(self, material: Material, forces: list[PETSc.Vec]) -> AffineLoads:
-        """Right-hand sides: a unit of each motion, and what is carried over."""
+        """Right-hand sides: a unit of each motion, and what is carried over or acts all along."""
         s, inertia = self._excitation.s, self._equations.inertia
         assert self._momentum is not None
         fades = [-fading(part.relaxation_time, s) for part in material.parts]
         carried = [np.ones_like(s), *fades, -fading(FADING, s)]
         vectors = [self._momentum, *forces]
-        if self._constant is not None:
-            carried.append(fading(None, s))
-            vectors.append(self._constant)
         num_motions = len(inertia)
         shape = (num_motions + len(carried), num_motions + 1, len(s))
         coefficients = np.zeros(shape, np.complex128)

@@ -36,8 +36,11 @@ from fenics_hytf.soil import shear_strength
 
 RealArray = npt.NDArray[np.float64]
 
-# Of the largest strength: what soil without cohesion and confinement is given.
-_LEAST_STRENGTH = 1e-3
+# Of the largest strength: what soil without cohesion and confinement is given. Soil beside rock has a
+# thousandth of its strength, and a search found mechanisms between strengths 2e5 apart.
+_LEAST_STRENGTH = 1e-6
+# Of k_y, by which a mechanism has to yield sooner than another one to be taken before it.
+_SOONER = 1e-3
 
 
 class Sliding:
@@ -141,7 +144,10 @@ class Sliding:
         level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
         ways = [(axis, sense) for axis in level for sense in (1, -1)]
         candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
-        best, axis, sense = min(candidates, key=lambda found: found[0].yield_coefficient)
+        best, axis, sense = candidates[0]
+        for found, other, way in candidates[1:]:
+            if found.yield_coefficient < best.yield_coefficient - _SOONER * abs(best.yield_coefficient):
+                best, axis, sense = found, other, way
         return best, SlipState(0.0, 0.0, 0.0, safety, axis, sense)
 
     def _next(self, points: Points, state: SlipState) -> Mechanism:

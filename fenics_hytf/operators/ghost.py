@@ -2,8 +2,8 @@
 """Ghost stabilisation of cells that are filled in part (Burman 2010; Sticko and Kreiss 2016).
 
 A cell that points fill by a fraction ε has nodes whose stiffness is ε times that of others, and the
-condition of K grows as ε falls. On facets between a cell at the edge of the filled ground and any
-filled one the jump of the normal derivative is penalised,
+condition of K grows as ε falls; a single point, three strains, leaves it a mechanism. On facets
+between such a cell and any filled one the jump of the normal derivative is penalised,
 
     K_G = Σ_F ∫ a_K Ē (h/3) [[∂u/∂n]]·[[∂v/∂n]] dS
 

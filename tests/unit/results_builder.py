@@ -129,7 +129,7 @@ def make_slide(slips=SLIPS, yields=(0.1, 0.11, 0.12, 0.13), end_rate=0.0, gdim=2
     0 empty besides.
     """
     soil = {"density": 1835.0, "shear_wave_velocity": 225.0, "poisson": 0.3, "cohesion": 2e4}
-    if gdim == 2:
+    if gdim == 2 and more.get("kind") != "column":
         size, cells = [40.0, 24.0], [20, 12]
         regions = [
             {"soil": "air", "polygon": AIR},
@@ -138,7 +138,8 @@ def make_slide(slips=SLIPS, yields=(0.1, 0.11, 0.12, 0.13), end_rate=0.0, gdim=2
         ]
         mesh = {"box": {"size": size, "cells": cells}, "regions": regions, "empty": ["air"]}
         more = {"mesh": mesh, **more}
-    given = {"kind": "box", "loop": False, "effects": SLIDES, "soil": {"sand": soil, "fill": soil}}
+    soils = {"soil": {"sand": soil, "fill": soil}}
+    given = {"kind": "box", "loop": False, "effects": SLIDES, "receivers": 1, **soils}
     result = make_result(lapses=len(slips), gdim=gdim, **(given | more))
     lapses, start = [], 0
     for lapse, slip, k_y, count in zip(result.lapses, slips, yields, SAMPLES, strict=False):
@@ -165,7 +166,7 @@ def make_slide_snapshot(result, index, fields=False):
     u = np.zeros_like(start)
     high = start[:, -1] > 10.0
     u[high, 0], u[high, -1] = came, -0.5 * came
-    size = 2.0 ** gdim if gdim == 2 else 5.0 * 5.0 * 2.0
+    size = 2.0**gdim if gdim == 2 else 5.0 * 5.0 * 2.0
     points = {
         "position": start + u,
         "displacement": u,
@@ -179,9 +180,7 @@ def make_slide_snapshot(result, index, fields=False):
     kind = "quad" if gdim == 2 else "hexahedron"
     end = result.lapses[index].start_time + result.lapses[index].num_samples * result.dt
     at_vertices = {"displacement": vertices} if fields else {}
-    return Snapshot(
-        index, end, points, vertices, corners, kind, at_vertices, state, with_mesh=True
-    )
+    return Snapshot(index, end, points, vertices, corners, kind, at_vertices, state, with_mesh=True)
 
 
 def _slip(lapse, slip, k_y, end_rate):

@@ -210,8 +210,11 @@ def _ground(stored: StoredResult) -> Iterator[tuple[Figure, Drawing]]:
     """Profiles and maps of what the ground went through."""
     how = caption(stored)
     text = "Peak of the total acceleration, peak shear strain, and the soil's state that fits it."
-    yield profiles(stored), Drawing("profiles.png", "Profiles", text + how, "ground")
+    text += how + without_slip(stored)
+    yield profiles(stored), Drawing("profiles.png", "Profiles", text, "ground")
     text = "Peaks of velocity and displacement relative to the base, and of shear stress."
+    if stored.slip is not None:
+        text += " Displacement holds the slip of one lapse, not of those before."
     title = "Profiles of further peaks"
     yield peak_profiles(stored), Drawing("profiles_peaks.png", title, text + how, "ground")
     maps = section(stored)

@@ -19,7 +19,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.results.figures.shown import without_slip
 from fenics_hytf.results.figures.style import COLOURS, MAX_LINES, QUIET, label, length_unit
 from fenics_hytf.results.reader import StoredResult
 
@@ -76,7 +75,7 @@ def caption(stored: StoredResult) -> str:
         text += " Over all lapses: the largest of each, of G/Gmax the smallest."
     if stored.summary["scene"]["mesh"]["kind"] != "column":
         text += " Dots: cells; lines: median of a region in bins of height."
-    return text + without_slip(stored)
+    return text
 
 
 def is_linear(stored: StoredResult) -> bool:
