@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+import basix
 import basix.ufl
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,11 @@ from dolfinx.mesh import Mesh, create_mesh, locate_entities_boundary
 from mpi4py import MPI
 
 from fenics_hytf import _compat
-from fenics_hytf.domain.checks import loose_cells, refuse_inverted_cells
+from fenics_hytf.domain.checks import (
+    jacobian_determinants,
+    loose_cells,
+    refuse_inverted_cells,
+)
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh, emptied
 from fenics_hytf.scene import (
@@ -104,6 +109,13 @@ class Domain:
         for cells, part in parts:
             everything[cells] = part
         return everything
+
+    def cell_sizes(self) -> npt.NDArray[np.float64]:
+        """Side of a square or cube of each local cell's volume [m], ghosts included."""
+        reference = self.mesh.basix_cell()
+        middle = basix.geometry(reference).mean(axis=0, keepdims=True)
+        volume = basix.cell.volume(reference) * jacobian_determinants(self.mesh, middle)[:, 0]
+        return np.asarray(np.abs(volume) ** (1 / self.gdim))
 
     def centroids(self) -> npt.NDArray[np.float64]:
         """Mean of the geometry nodes of every cell, in the order of the input (collective).

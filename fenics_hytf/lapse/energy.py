@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.integrate import simpson
 from scipy.interpolate import make_interp_spline
 
 from fenics_hytf.frequency import multiply
@@ -27,6 +28,7 @@ from fenics_hytf.lapse.response import Response
 RealArray = npt.NDArray[np.float64]
 
 _SPLINE = 5  # degree through the power, for its integral
+_FINER = 10  # parts of a sample or of a memory that fades: Simpson's rule is then right to 1e-6
 
 
 @dataclass(frozen=True)
@@ -136,8 +138,21 @@ class Course:
             return np.asarray(self._comm.allreduce(row @ x))
         return np.asarray(self._comm.allreduce(row @ self._W) @ x)
 
-    def integral(self, power: RealArray) -> float:
-        """Over the lapse, of a spline through the samples."""
+    def integral(self, power: RealArray, relaxation_time: float | None = None) -> float:
+        """Over the lapse, of a spline through the samples.
+
+        Args:
+            power: At the samples and the end, shape ``(num_samples + 1,)``.
+            relaxation_time: τ of e^{−t/τ} that it is to be multiplied by [s], which may fade sooner
+                than from one sample to the next.
+
+        Returns:
+            The integral.
+        """
         degree = _SPLINE if len(power) > _SPLINE else 1
         spline = make_interp_spline(self.time, power, k=degree)
-        return float(spline.integrate(self.time[0], self.time[-1]))
+        if relaxation_time is None:
+            return float(spline.integrate(self.time[0], self.time[-1]))
+        apart = min(self._given.dt, relaxation_time) / _FINER
+        fine = np.linspace(self.time[0], self.time[-1], 2 * int(np.ceil(self.time[-1] / apart)) + 1)
+        return float(simpson(spline(fine) * np.exp(-fine / relaxation_time), x=fine))

@@ -232,6 +232,21 @@ class Equations:
         self._inertia = [self._inertia_force(Mr) for Mr in self._influence]
         self._constrain("mass", M)
         M.destroy()
+        if self._ghost is not None:
+            self._hold_loose(self._ghost, points)
+
+    def _hold_loose(self, ghost: GhostForm, points: Points) -> None:
+        """M and a ghost of its size, for nodes that hardly any point weighs on.
+
+        What points carry is brought to the nodes with it: a point that has just come into a cell
+        tells next to nothing of the far nodes, and M alone made of that hundreds of metres a second.
+        """
+        totals = [points.mass.sum(), points.volume.sum()]
+        mass, volume = np.sum(self._domain.comm.allgather(totals), axis=0)
+        modulus = mass / volume * self._domain.cell_sizes() ** 2
+        ghost.assemble(self._K, modulus)
+        held = self._constrain("held mass", self._K)
+        held.axpy(1.0, self.mass, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
 
     def _pattern(self) -> None:
         """Give K its pattern, before any value is known, and the base its dashpots."""
@@ -423,10 +438,10 @@ class Equations:
         """M⁻¹ f on this rank's unknowns (collective), by conjugate gradients.
 
         Points weigh a well-conditioned mass as long as each cell has as many as it was seeded with;
-        where some directions have hardly any mass, what is found in them is what the force excites.
+        where cells have lost points M is held by a ghost.
 
         Args:
-            force: f.
+            force: f, such as the momentum SᵀM_p v of the points.
 
         Returns:
             Shape ``(num_local_unknowns,)``.
@@ -437,7 +452,8 @@ class Equations:
             self._mass_solver.setType(PETSc.KSP.Type.CG)
             self._mass_solver.getPC().setType(PETSc.PC.Type.JACOBI)
             self._mass_solver.setTolerances(rtol=_MASS_TOLERANCE, atol=0.0, max_it=_MASS_STEPS)
-        self._mass_solver.setOperators(self._constrained["mass"])
+        held = self._constrained.get("held mass", self._constrained["mass"])
+        self._mass_solver.setOperators(held)
         x = force.duplicate()
         self._mass_solver.solve(force, x)
         values = x.array_r.real.copy()

@@ -99,6 +99,7 @@ class Handover:
         self._at_gauss: State
         self._at_centres: State
         self._momentum: PETSc.Vec | None = None
+        self._velocity: RealArray
         self._statics = statics if scene.effects.convection else None
         self._imbalance: PETSc.Vec | None = None
         # φ on the unknowns, and the rate at which a mechanism slips as the lapse begins: its
@@ -132,7 +133,11 @@ class Handover:
         S = transfer_matrix(points, self._domain.V)
         self.destroy()
         momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
-        self._momentum = self._equations.unknowns.collect(momentum.ravel())
+        found = self._equations.unknowns.collect(momentum.ravel())
+        # The momentum of the nodes' velocity: that of the points but for what no node can have.
+        self._velocity = self._equations.accelerate(found)
+        self._momentum = product([(self._equations.mass, 1.0)], self._velocity, like=found)
+        found.destroy()
         if self._statics is not None and self._segment.index:
             left = self._statics.imbalance(points)
             self._imbalance = self._equations.unknowns.collect(left)
@@ -203,8 +208,7 @@ class Handover:
         viscous = [(C, 1.0) for C in equations.viscous]
         taus = [*(part.relaxation_time for part in material.parts), FADING]
         rates = [-1 / tau if tau else 0.0 for tau in taus]
-        assert self._momentum is not None
-        v = self._equations.accelerate(self._momentum)
+        v = self._velocity
         ones, stiff = [1.0] * len(forces), equations.stiff
         force = self._start_force(0, motion[0], forces, ones, [(viscous, v)])
         rate = self._start_force(1, motion[1], forces, rates, [(stiff, v)])

@@ -84,15 +84,17 @@ def handover_energy(
         power += acceleration * course.linear(inertia, v)
     for C in solved.viscous:
         lost += course.quadratic(C, v)
+    faded = 0.0  # of memories, which may fade sooner than from one sample to the next
     # Matrices of the parts come first among the stiff ones.
     own, others = solved.stiff[: len(material.parts)], solved.stiff[len(material.parts) :]
     for part, force, (matrix, _) in zip(material.parts, forces.parts, own, strict=True):
         tau = part.relaxation_time
         if tau is not None:  # ζ = ζ₀ e^{−t/τ} + what the lapse adds
-            z, left = course.coordinates(relaxation_time=tau), np.exp(-course.time / tau)
-            held = 2 * stock.elastic(state, only=part)
-            cross = course.linear(force, z)
-            lost += (course.quadratic(matrix, z) + 2 * left * cross + left**2 * held) / tau
+            z = course.coordinates(relaxation_time=tau)
+            lost += course.quadratic(matrix, z) / tau
+            faded += 2 / tau * course.integral(course.linear(force, z), tau)
+            left = np.exp(-2 * course.time[-1] / tau)
+            faded += stock.elastic(state, only=part) * (1 - left)
     released = np.exp(-course.time / FADING) * course.linear(forces.rest, v)
     kinetic = 0.5 * course.quadratic(solved.system.mass, v)
     if slip is not None:
@@ -105,7 +107,7 @@ def handover_energy(
     stored = float(kinetic[0]) + strain[0]
     return Energy(
         course.integral(power),
-        course.integral(lost),
+        course.integral(lost) + faded,
         course.integral(released),
         (float(kinetic[0]), float(kinetic[-1])),
         (strain[0], strain[1]),

@@ -146,7 +146,9 @@ class Sliding:
         candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
         best, axis, sense = candidates[0]
         for found, other, way in candidates[1:]:
-            if found.yield_coefficient < best.yield_coefficient - _SOONER * abs(best.yield_coefficient):
+            if found.yield_coefficient < best.yield_coefficient - _SOONER * abs(
+                best.yield_coefficient
+            ):
                 best, axis, sense = found, other, way
         return best, SlipState(0.0, 0.0, 0.0, safety, axis, sense)
 
@@ -226,6 +228,7 @@ def cell_size(domain: Domain) -> float:
     """The smallest edge of all cells [m] (collective)."""
     mesh = domain.mesh
     mesh.topology.create_entities(1)
+    mesh.topology.create_connectivity(1, mesh.topology.dim)
     edges = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
     ends = mesh.geometry.x[entities_to_geometry(mesh, 1, edges)]
     mine = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min(initial=np.inf)

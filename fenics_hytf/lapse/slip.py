@@ -50,7 +50,7 @@ Kernel = Callable[[AffineLoads, ComplexArray, float], Sweep]
 
 # Residual of the kernel's sweep. The quadrature makes ten thousand times as much of an error of P,
 # which is of the second order in the residual.
-_KERNEL = 1e-7
+_KERNEL = 1e-5
 _ROLL_OFF = 0.5  # of the highest line, from where on less and less of λ̈ excites vibration
 _LEAST = 4  # samples of a lapse, however fast it slips
 
