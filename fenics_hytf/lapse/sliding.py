@@ -144,12 +144,12 @@ class Sliding:
         level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
         ways = [(axis, sense) for axis in level for sense in (1, -1)]
         candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
-        best, axis, sense = candidates[0]
-        for found, other, way in candidates[1:]:
-            if found.yield_coefficient < best.yield_coefficient - _SOONER * abs(
-                best.yield_coefficient
-            ):
-                best, axis, sense = found, other, way
+        first = candidates[0]
+        for candidate in candidates[1:]:
+            lowest = first[0].yield_coefficient
+            if candidate[0].yield_coefficient < lowest - _SOONER * abs(lowest):
+                first = candidate
+        best, axis, sense = first
         return best, SlipState(0.0, 0.0, 0.0, safety, axis, sense)
 
     def _next(self, points: Points, state: SlipState) -> Mechanism:
