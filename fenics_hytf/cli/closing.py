@@ -38,12 +38,27 @@ def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
         change = lapses[-1]["final_change"]
         last = "" if change is None else f", last change {change:.1e}"
         rows.append(("iterations", f"{sum(iterations)}{last}"))
+    rows += _slip(summary)
     rows += _seams(summary)
     rows += _base(summary)
     rows += _peaks(summary)
     rows += [("warning", text) for text in summary["warnings"]]
     rows.append(("results", f"{folder / 'report.html' if plots else folder}"))
     return "\n".join([summary["title"], *(f"  {name:11s} {text}" for name, text in rows)])
+
+
+def _slip(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What slid, beside what sliding blocks say."""
+    told = summary["sliding"]
+    if told is None:
+        return []
+    rest = told["at_rest_s"]
+    words = (
+        f"factor of safety {told['factor_of_safety']:.3g}, k_y {told['yield_coefficient']:.3g}; "
+        f"slip {told['slip_m']:.3g} m (decoupled {told['decoupled_m']:.3g}, rigid "
+        f"{told['rigid_m']:.3g}), "
+    )
+    return [("sliding", words + ("still moving" if rest is None else f"at rest at {rest:.3g} s"))]
 
 
 def _seams(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
