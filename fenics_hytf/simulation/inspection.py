@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from mpi4py import MPI
 
-from fenics_hytf.domain import Domain, constraint_matrix
+from fenics_hytf.domain import Domain, bare_nodes, constraint_matrix
 from fenics_hytf.lapse import Scheme, excite, scheme_of, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
@@ -88,7 +88,10 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     scheme = scheme_of(scene, domain.region_names)
     points = seed_points(scene, domain, scheme.carried(domain.num_components))
     axes = tuple(domain.components.index(m.direction) for m in scene.motion)
-    T = constraint_matrix(domain, scene.supports, axes)
+    bare = None
+    if scene.mesh.empty:
+        bare = bare_nodes(domain, domain.gather_cells(domain.regions.astype(np.int64)) >= 0)
+    T = constraint_matrix(domain, scene.supports, axes, bare)
     unknowns = int(T.getSize()[1])
     T.destroy()
     lines = _lines(scene, scheme, axes)
@@ -154,6 +157,8 @@ def _continuity(scene: Scene, scheme: Scheme) -> str:
     name, several = scene.lapses.continuity, len(scene.segments) > 1
     if _names(scene, "lapses", "continuity"):
         why = "named"
+    elif scene.effects.sliding is not None:
+        why = "the default for what slides"
     elif not several:
         why = "the default for one lapse"
     else:
@@ -176,7 +181,9 @@ def _complex_modulus(scene: Scene) -> str:
     if _names(scene, "solver", "complex_modulus"):
         why = "named"
     else:
-        why = "the default" + (" for several transient lapses" if name == "maxwell" else "")
+        slides = scene.effects.sliding is not None
+        several = " for what slides" if slides else " for several transient lapses"
+        why = "the default" + (several if name == "maxwell" else "")
     if name != "maxwell":
         return f"{name} ({why})"
     given = _names(scene, "solver", "reference_frequency")
@@ -206,7 +213,9 @@ def _notes(
         )
     if scene.solver.complex_modulus == "maxwell":
         yield from _damping_notes(scene, soils)
-    if effects.convection and len(lines) == 1:
+    if effects.sliding is not None:
+        yield "what slides may cut lapses short, and go on after the motion until it rests"
+    elif effects.convection and len(lines) == 1:
         yield "convection acts between lapses; the scene has one"
     if effects.convection and steady:
         yield "under steady continuity the net movement of the points in a lapse is zero"

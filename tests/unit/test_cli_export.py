@@ -167,9 +167,9 @@ def test_files_that_are_there_need_force(here, hytf):
 def test_an_older_result_is_refused(here, hytf):
     store()
     path = Path("r/summary.json")
-    path.write_text(path.read_text().replace('"format": 3', '"format": 2'))
+    path.write_text(path.read_text().replace('"format": 4', '"format": 3'))
     code, _, err = hytf("r")
-    assert code == 2 and "of format 2, this version reads 3" in err
+    assert code == 2 and "of format 3, this version reads 4" in err
     assert not Path("r-motions").exists()
 
 
