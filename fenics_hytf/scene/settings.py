@@ -175,7 +175,7 @@ class Sliding(Table):
     """
 
     time_step: Annotated[float, Field(gt=0, le=0.05)] = Field(
-        0.0025, description="a time step above 0, at most 0.05 [s]"
+        0.00125, description="a time step above 0, at most 0.05 [s]"
     )
     new_mechanism: Annotated[float, Field(gt=0, le=1)] = Field(
         0.3, description="a number above 0, at most 1 [-]"
