@@ -107,7 +107,7 @@ def handover_energy(
     stored = float(kinetic[0]) + strain[0]
     return Energy(
         course.integral(power),
-        course.integral(lost) + faded,
+        course.integral(lost) + float(faded),
         course.integral(released),
         (float(kinetic[0]), float(kinetic[-1])),
         (strain[0], strain[1]),

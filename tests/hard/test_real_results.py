@@ -154,7 +154,7 @@ def test_20_positions_are_real(name, tmp_path, figure):
         dropped = max(dropped, float(np.abs(points.imag).max()))
         moved = max(moved, float(np.abs(points.real).max()))
         # The code's own way, from one sign of ω, is the same displacement.
-        taken = lapse.equations.expand(Response(one, excitation).unknowns_at(time))
+        taken = lapse.equations.unknowns.expand(Response(one, excitation).unknowns_at(time))
         np.testing.assert_allclose(
             S @ taken.ravel(), points.real, rtol=0, atol=1e-12 * np.abs(points.real).max()
         )

@@ -269,8 +269,8 @@ def test_stiffness_that_changes_from_cell_to_cell(tmp_path, monkeypatch, figure)
     dampings = rng.uniform(0.01, 0.15, (lapses, cells))
     survey, calls = steps.survey, []
 
-    def changing(case, domain, points):
-        ground = survey(case, domain, points)
+    def changing(case, domain, *points):
+        ground = survey(case, domain, *points)
         # By height from the base up, whatever the order of the cells.
         number = np.floor(domain.centroids()[:, 1] / column.CELL).astype(int)
         lapse = len(calls)
