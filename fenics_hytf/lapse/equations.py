@@ -239,7 +239,7 @@ class Equations:
         """M and a ghost of its size, for nodes that hardly any point weighs on.
 
         What points carry is brought to the nodes with it: a point that has just come into a cell
-        tells next to nothing of the far nodes, and M alone made of that hundreds of metres a second.
+        tells next to nothing of the far nodes, and M alone made a hundred metres a second of that.
         """
         totals = [points.mass.sum(), points.volume.sum()]
         mass, volume = np.sum(self._domain.comm.allgather(totals), axis=0)

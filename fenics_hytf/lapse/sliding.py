@@ -36,8 +36,8 @@ from fenics_hytf.soil import shear_strength
 
 RealArray = npt.NDArray[np.float64]
 
-# Of the largest strength: what soil without cohesion and confinement is given. Soil beside rock has a
-# thousandth of its strength, and a search found mechanisms between strengths 2e5 apart.
+# Of the largest strength: what soil without cohesion and confinement is given. Soil beside rock has
+# a thousandth of its strength, and a search found mechanisms between strengths 2e5 apart.
 _LEAST_STRENGTH = 1e-6
 # Of k_y, by which a mechanism has to yield sooner than another one to be taken before it.
 _SOONER = 1e-3

@@ -1,4 +1,4 @@
-"""Sliding through whole simulations: a slope against an elastoplastic one, lapses, energy, refusal."""
+"""Sliding through whole simulations: against elastoplastic ground, lapses, energy, refusal."""
 
 import copy
 
