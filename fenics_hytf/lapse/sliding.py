@@ -135,13 +135,16 @@ class Sliding:
 
     def _first(self) -> tuple[Mechanism, SlipState]:
         """The mechanism with the least k_y, over both senses of every horizontal motion."""
+        level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
+        if not level:
+            expected = "one along the ground, which drives what slides"
+            raise SceneError([Fault("motion", "vertical motion alone", expected)])
         T = self._statics.unknowns.T
         safety = self._search.factor_of_safety(T, self._weight, self._strength, self._gravity)
         if safety < 1 and not self._settings.unstable_at_rest:
             found = f"a slope with a factor of safety of {safety:.3g} at rest"
             expected = "more than 1 before it is shaken, or unstable_at_rest = true to let it go"
             raise SceneError([Fault("effects.sliding", found, expected)])
-        level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
         ways = [(axis, sense) for axis in level for sense in (1, -1)]
         candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
         first = candidates[0]

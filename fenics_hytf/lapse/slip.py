@@ -152,6 +152,8 @@ class LapseSlip:
             if history.num_steps <= _LEAST * self._substeps:
                 history = march(*arguments, None)
                 history = _first(history, _LEAST * self._substeps + 1)
+            # A difference of λ there has half of the first α in it, and is no rate of the lapse.
+            history.rate[0] = state.rate
         count = (history.num_steps - 1) // self._substeps
         last = count * self._substeps + 1
         return self._slipped(_first(history, last), count)

@@ -242,7 +242,8 @@ class LapseRecord:
         Returns:
             On the contour's lines, in the record's unit, shape ``(num_motions, num_lines)``.
         """
-        over = min(num_samples // 2, contour.period - num_samples)
+        # A lapse that was cut short fades as slowly as a whole one.
+        over = min(max(num_samples // 2, contour.period // 12), contour.period - num_samples)
         taper = np.cos(0.5 * np.pi * (np.arange(over) + 0.5) / max(over, 1)) ** 2
         shape = np.concatenate([np.ones(num_samples), taper])
         piece = self.samples[:, start : start + len(shape)]
