@@ -427,7 +427,7 @@ class Run:
         self._assemblies.clear()
         self._assemblies.update(state.work.assemblies)
         for phase, seconds in state.work.wall_s.items():
-            self.clock.wall_s[phase] += seconds
+            self.clock.wall_s[phase] = self.clock.wall_s.get(phase, 0.0) + seconds
         self._work = replace(state.work, wall_s=self.clock.wall_s)
 
     def _observer(self, index: int, side: str = "") -> Observer:
