@@ -94,7 +94,7 @@ class Sliding:
 
     @property
     def moving(self) -> bool:
-        """Whether something slips as the next lapse begins, or would at once."""
+        """Whether something slips as the next lapse begins."""
         state = self.state
         return state is not None and state.rate > 0
 
