@@ -250,6 +250,17 @@ class Handover:
         given = self._record.samples[:, self._segment.start : self._segment.stop + 1]
         return np.pad(given, ((0, 0), (0, self._segment.num_samples + 1 - given.shape[1])))
 
+    def motion_between(self, substeps: int) -> RealArray:
+        """Base acceleration from the start of the lapse to its end, between samples too [m/s^2].
+
+        Args:
+            substeps: Steps from one sample to the next.
+
+        Returns:
+            Shape ``(num_motions, num_samples·substeps + 1)``.
+        """
+        return self._record.between(self._segment.start, self._segment.stop, substeps)
+
     def _start_force(
         self,
         derivative: int,

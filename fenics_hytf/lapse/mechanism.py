@@ -275,6 +275,8 @@ class _Search:
                 self._moduli(np.sum(strain**2, axis=2), smoothing), self._forces
             )
             directions = [target - flow] + ([] if previous is None else [flow - previous])
+            # They do no work but for round-off, which steps would lower F by, again and again.
+            directions = [d - self._work(self._driving, d) * flow for d in directions]
             previous = flow
             flow = flow + self._best_step(flow, directions, smoothing)
         raise MechanismError(len(functional), change, functional[-1])

@@ -218,7 +218,7 @@ class Sliding:
             response,
             equations,
             self._equations.inertia,
-            self._handover.motion_to_end,
+            self._handover.motion_between,
             self._g * self._mechanism.yield_coefficient,
             self._settings.time_step,
         ) as lapse:

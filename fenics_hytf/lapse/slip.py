@@ -38,7 +38,6 @@ from fenics_hytf.motion import (
     ConvolutionQuadrature,
     SlipHistory,
     march,
-    refined,
     rigid_slip,
 )
 
@@ -65,8 +64,8 @@ class LapseSlip:
         response: The response without slip.
         equations: The equations it was solved with.
         inertia: −TᵀM r of each motion.
-        motion: Base acceleration of each motion at the samples of the lapse and the one after them
-            [m/s^2], shape ``(num_motions, num_samples + 1)``.
+        motion: Base acceleration of each motion from the start of the lapse to its end [m/s^2],
+            shape ``(num_motions, num_samples·substeps + 1)``, of the number of substeps.
         yield_acceleration: g k_y [m/s^2].
         time_step: The longest step of the march [s].
 
@@ -81,7 +80,7 @@ class LapseSlip:
         response: Response,
         equations: LapseEquations,
         inertia: Sequence[PETSc.Vec],
-        motion: RealArray,
+        motion: Callable[[int], RealArray],
         yield_acceleration: float,
         time_step: float,
     ) -> None:
@@ -101,7 +100,7 @@ class LapseSlip:
         self._modal_damping = float(self._phi.dot(self._C_phi).real)
         number = given.axes.index(state.axis)
         self._mass = state.sense * self._masses[number]
-        self._motion = refined(motion, self._substeps)
+        self._motion = motion(self._substeps)
         self._drive = -state.sense * self._motion[number]
         self._driving = self._linear_force()
 

@@ -19,7 +19,7 @@ from math import comb, factorial
 import numpy as np
 import numpy.typing as npt
 from scipy import fft
-from scipy.interpolate import make_interp_spline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from fenics_hytf.motion.spectra import above, frequencies
 
@@ -213,20 +213,39 @@ class LapseRecord:
     dt: float
 
     @cached_property
+    def _spline(self) -> BSpline:
+        count = self.samples.shape[1]
+        time = self.dt * np.arange(count)
+        return make_interp_spline(time, self.samples, k=_SPLINE if count > _SPLINE else 1, axis=1)
+
+    @cached_property
     def derivatives(self) -> RealArray:
         """The record with two derivatives, from a spline, shape ``(3, num_motions, num_samples)``.
 
         Units of the record, over s and over s².
         """
-        count = self.samples.shape[1]
-        time = self.dt * np.arange(count)
-        degree = _SPLINE if count > _SPLINE else 1
-        spline = make_interp_spline(time, self.samples, k=degree, axis=1)
+        time = self.dt * np.arange(self.samples.shape[1])
         parts = [self.samples]
         for order in (1, 2):
-            found = spline.derivative(order)(time) if order <= degree else 0 * self.samples
+            known = order <= self._spline.k
+            found = self._spline.derivative(order)(time) if known else 0 * self.samples
             parts.append(np.asarray(found))
         return np.stack(parts)
+
+    def between(self, start: int, stop: int, substeps: int) -> RealArray:
+        """The record between samples too, from the spline, which is close to what lines make of it.
+
+        Args:
+            start: First sample.
+            stop: Last one; the record is nought beyond its end.
+            substeps: Steps from one sample to the next.
+
+        Returns:
+            Shape ``(num_motions, (stop − start)·substeps + 1)``.
+        """
+        steps = start + np.arange((stop - start) * substeps + 1) / substeps
+        inside = steps <= self.samples.shape[1] - 1
+        return np.where(inside, self._spline(self.dt * np.where(inside, steps, 0.0)), 0.0)
 
     def weights(self, contour: Contour, start: int, num_samples: int) -> ComplexArray:
         """Transform of a lapse, X(s)/dt.

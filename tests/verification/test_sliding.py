@@ -261,6 +261,16 @@ def test_dashpots(alpha, base, lapses, tmp_path, figure):
     figure(f"column {name}, {lapses} lapses: slip", off, 5e-3)
 
 
+@with_records
+def test_the_energy_of_a_record_of_long_steps(tmp_path, figure):
+    """20 ms: the march sees between samples what the lines see, not straight lines."""
+    record = recorded(RECORDS["Northridge"])
+    acceleration = record.scaled(pga_g=0.5).acceleration[:450]
+    result = simulate(column(in_file(tmp_path, acceleration, record.dt), 0.05, 100.0, damping=0.05))
+    assert total(result) > 0.1
+    figure("column, Northridge at 20 ms: energy left open", abs(open_energy(result)), 0.02)
+
+
 # ---------------------------------------------------------------- strength
 
 
@@ -282,6 +292,18 @@ def level(soils: dict[str, dict], layers: list[tuple[float, str, int]], **effect
             "effects": {"gravity": {"acceleration": GRAVITY}, "sliding": True, **effects},
         }
     )
+
+
+@pytest.mark.parametrize(("cohesion", "angle", "k0"), [(0.0, 30.0, 0.5), (5e3, 35.0, 0.7)])
+def test_friction_on_level_ground(cohesion, angle, k0, figure):
+    """τ_f = c cos φ + ½(1 + K0) σ_v sin φ: the lowest cell yields first, if any cell does."""
+    soil = {"cohesion": cohesion, "friction_angle": angle, "k0": k0}
+    slip = simulate(level({"sand": soil}, [(10.0, "sand", 10)])).lapses[0].slip
+    phi, depth = np.radians(angle), 9.5
+    expected = 0.5 * (1 + k0) * np.sin(phi)
+    expected += cohesion * np.cos(phi) / (DENSITY * GRAVITY * depth)
+    found = slip.yield_coefficient
+    figure(f"level ground, φ {angle:g}°, c {cohesion:g} Pa: k_y", abs(found / expected - 1), 1e-3)
 
 
 @pytest.mark.parametrize("cohesion", [1e6, 1e9])
