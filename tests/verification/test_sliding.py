@@ -334,7 +334,11 @@ def test_a_slope_in_a_mirror(figure):
 @pytest.mark.skipif(WORLD.size == 1, reason="compares several ranks with one")
 @pytest.mark.parametrize("moves", [False, True])
 def test_ranks(moves, figure):
-    """φ is found with moduli some 1e9 times apart, and differs by 1e-8; so does what slips."""
+    """As 1e-8 on ranks with a mesh each; those that share one factorise in another order.
+
+    φ is found with moduli some 1e9 times apart, so it is known to 1e-7; on 3 ranks that share the
+    mesh slip was 1.1e-8 off.
+    """
     data = slope(lapses=2, convection=moves, sliding={"time_step": 0.005})
     data["solver"]["sweep"] = "direct"
     alone = simulate(Scene.from_dict(data), SELF)
@@ -344,7 +348,7 @@ def test_ranks(moves, figure):
         expected = np.array([lapse.slip.slip[-1] for lapse in alone.lapses])
         np.testing.assert_array_equal(slip, WORLD.bcast(slip))
         said = f"slope on {WORLD.size} ranks, {size} a mesh, {'moving' if moves else 'fixed'}: slip"
-        figure(said, abs(slip - expected).max() / expected.max(), 5e-8)
+        figure(said, abs(slip - expected).max() / expected.max(), 1e-8 if size == 1 else 5e-8)
 
 
 def arrays(result: Result) -> dict[str, bytes]:
