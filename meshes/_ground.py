@@ -277,6 +277,18 @@ def check_number(*counts: int) -> None:
         )
 
 
+def add_slope_options(parser: argparse.ArgumentParser) -> None:
+    """Options of a slope's outline, of the names that slopes in sections and in space share."""
+    add = parser.add_argument
+    add("--height", type=float, default=10.0, help="from toe to crest [m]")
+    add("--depth", type=float, default=5.0, help="from the toe to the base [m]")
+    inclination = parser.add_mutually_exclusive_group()
+    inclination.add_argument("--slope", type=float, help="run over rise; 1.5 if absent")
+    inclination.add_argument("--angle", type=float, help="from the horizontal [degrees]")
+    add("--behind", type=float, help="left of the crest [m]; 2 heights if absent")
+    add("--before", type=float, help="right of the toe [m]; 2.5 heights if absent")
+
+
 def add_ground_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that make a :class:`Ground`."""
     usual = Ground()

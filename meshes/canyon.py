@@ -13,10 +13,13 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
+import sys
 from pathlib import Path
 
 import gmsh
+
+sys.path.append(str(Path(__file__).parent))  # where it is not run as a script
+from _command import draw_as_asked
 
 # Blocks by their corners, counter-clockwise; see _corners. The first three lie at the canyon.
 _BLOCKS = (
@@ -166,19 +169,5 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line.
-
-    Args:
-        arguments: Those of the process if ``None``.
-    """
-    options = parser()
-    given = vars(options.parse_args(arguments))
-    try:
-        canyon(given.pop("output"), **given)
-    except ValueError as error:
-        options.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    draw_as_asked(canyon, parser())

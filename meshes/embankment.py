@@ -21,6 +21,7 @@ from pathlib import Path
 import gmsh
 
 sys.path.append(str(Path(__file__).parent))  # where it is not run as a script
+from _command import draw_as_asked
 from _ground import Ground, positive
 from _section import draw_section
 
@@ -111,19 +112,5 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line.
-
-    Args:
-        arguments: Those of the process if ``None``.
-    """
-    options = parser()
-    given = vars(options.parse_args(arguments))
-    try:
-        embankment(given.pop("output"), **given)
-    except (ValueError, RuntimeError) as error:
-        options.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    draw_as_asked(embankment, parser())

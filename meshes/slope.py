@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 sys.path.append(str(Path(__file__).parent))  # where it is not run as a script
-from _ground import Ground, add_ground_options, positive, run_over_rise
+from _command import draw_as_asked
+from _ground import Ground, add_ground_options, add_slope_options, positive, run_over_rise
 from _section import draw_section
 
 
@@ -63,31 +63,11 @@ def slope(
 def parser() -> argparse.ArgumentParser:
     """Options, of the names of the arguments of :func:`slope`."""
     options = argparse.ArgumentParser(description="Mesh of a slope that falls to the right.")
-    options.add_argument("--height", type=float, default=10.0, help="from toe to crest [m]")
-    options.add_argument("--depth", type=float, default=5.0, help="from the toe to the base [m]")
-    inclination = options.add_mutually_exclusive_group()
-    inclination.add_argument("--slope", type=float, help="run over rise; 1.5 if absent")
-    inclination.add_argument("--angle", type=float, help="from the horizontal [degrees]")
-    options.add_argument("--behind", type=float, help="left of the crest [m]; 2 heights if absent")
-    options.add_argument("--before", type=float, help="right of the toe [m]; 2.5 heights if absent")
+    add_slope_options(options)
     add_ground_options(options)
     options.add_argument("-o", "--output", type=Path, default=Path("slope.msh"))
     return options
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line.
-
-    Args:
-        arguments: Those of the process if ``None``.
-    """
-    options = parser()
-    given = vars(options.parse_args(arguments))
-    try:
-        slope(given.pop("output"), **given)
-    except (ValueError, RuntimeError) as error:
-        options.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    draw_as_asked(slope, parser())

@@ -25,10 +25,12 @@ import numpy as np
 import numpy.typing as npt
 
 sys.path.append(str(Path(__file__).parent))  # where it is not run as a script
+from _command import draw_as_asked
 from _file import draw
 from _ground import (
     Ground,
     add_ground_options,
+    add_slope_options,
     check_number,
     count,
     positive,
@@ -192,13 +194,7 @@ def parser() -> argparse.ArgumentParser:
     """Options, of the names of the arguments of :func:`slope3d`."""
     options = argparse.ArgumentParser(description="Mesh of a slope in space, in hexahedra.")
     add = options.add_argument
-    add("--height", type=float, default=10.0, help="from toe to crest [m]")
-    add("--depth", type=float, default=5.0, help="from the toe to the base [m]")
-    inclination = options.add_mutually_exclusive_group()
-    inclination.add_argument("--slope", type=float, help="run over rise; 1.5 if absent")
-    inclination.add_argument("--angle", type=float, help="from the horizontal [degrees]")
-    add("--behind", type=float, help="left of the crest [m]; 2 heights if absent")
-    add("--before", type=float, help="right of the toe [m]; 2.5 heights if absent")
+    add_slope_options(options)
     add("--width", type=float, default=20.0, help="along y [m]")
     add("--cut", type=float, nargs=2, metavar=("Y1", "Y2"), help="ends of the toe along y [m]")
     add("--bulge", type=float, default=0.0, help="of the middle of the face before its ends [m]")
@@ -207,19 +203,5 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line.
-
-    Args:
-        arguments: Those of the process if ``None``.
-    """
-    options = parser()
-    given = vars(options.parse_args(arguments))
-    try:
-        slope3d(given.pop("output"), **given)
-    except (ValueError, RuntimeError) as error:
-        options.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    draw_as_asked(slope3d, parser())

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 sys.path.append(str(Path(__file__).parent))  # where it is not run as a script
+from _command import draw_as_asked
 from _ground import Ground, add_ground_options, positive, run_over_rise
 from _section import draw_section
 
@@ -80,19 +80,5 @@ def parser() -> argparse.ArgumentParser:
     return options
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Command line.
-
-    Args:
-        arguments: Those of the process if ``None``.
-    """
-    options = parser()
-    given = vars(options.parse_args(arguments))
-    try:
-        terraces(given.pop("output"), **given)
-    except (ValueError, RuntimeError) as error:
-        options.error(str(error))
-
-
 if __name__ == "__main__":
-    main()
+    draw_as_asked(terraces, parser())

@@ -46,6 +46,22 @@ def figure() -> Callable[..., None]:
 
 
 @pytest.fixture
+def hytf(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int | str | None, str, str]]:
+    """Run the command line in this process: exit code, standard output and error."""
+
+    def call(*arguments: object) -> tuple[int | str | None, str, str]:
+        from fenics_hytf.cli import main
+
+        with pytest.raises(SystemExit) as stop:
+            main([str(argument) for argument in arguments])
+        out, err = capsys.readouterr()
+        assert stop.value.code == 1 or "Traceback" not in err  # 1 is a bug, which shows where
+        return stop.value.code, out, err
+
+    return call
+
+
+@pytest.fixture
 def shared_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder that is the same on every rank; write on rank 0 only, then meet at a barrier."""
     from mpi4py import MPI

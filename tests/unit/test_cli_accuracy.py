@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_hytf.cli import accuracy, main
+from fenics_hytf.cli import accuracy
 from fenics_hytf.simulation import simulate
 from fenics_hytf.study import StudyProgress, time_domain
 from fenics_hytf.study.runs import Cost, Outcome
@@ -49,17 +49,6 @@ def here(tmp_path, monkeypatch):
         monkeypatch.delenv(name, raising=False)
     Path("s.toml").write_text(SCENE)
     return tmp_path
-
-
-@pytest.fixture
-def hytf(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main([str(a) for a in arguments])
-        out, err = capsys.readouterr()
-        return stop.value.code, out, err
-
-    return call
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_hytf.cli import demos, main
+from fenics_hytf.cli import demos
 
 SCENE = """
 title = "A demo"
@@ -43,17 +43,6 @@ def here(tmp_path, monkeypatch):
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     return tmp_path / "here"
-
-
-@pytest.fixture
-def hytf(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main([str(a) for a in arguments])
-        out, err = capsys.readouterr()
-        return stop.value.code, out, err
-
-    return call
 
 
 def names(folder):

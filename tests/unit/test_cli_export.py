@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_hytf.cli import main
 from fenics_hytf.motion import read, read_csv
 from fenics_hytf.results import open_result, read_table
 from tests.unit.results_builder import make_result
@@ -23,15 +22,8 @@ def here(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def hytf(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main(["export", *(str(a) for a in arguments)])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return stop.value.code, out, err
-
-    return call
+def hytf(hytf):
+    return lambda *arguments: hytf("export", *arguments)
 
 
 def store(name="r", **case):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_hytf.cli import main, mesh
+from fenics_hytf.cli import mesh
 from fenics_hytf.domain.files import read_mesh
 
 KINDS = ["canyon", "embankment", "slope", "slope3d", "terraces"]
@@ -34,18 +34,6 @@ receivers = { crest = [5.0, 6.0] }
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path
-
-
-@pytest.fixture
-def hytf(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main([str(a) for a in arguments])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return stop.value.code, out, err
-
-    return call
 
 
 def names(folder):

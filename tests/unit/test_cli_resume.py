@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from fenics_hytf.cli import main, run
+from fenics_hytf.cli import run
 from fenics_hytf.simulation import SimulationError
 from tests.unit.results_builder import make_result, make_snapshot
 
@@ -45,17 +45,6 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("s.toml").write_text(SCENE)
     return tmp_path
-
-
-@pytest.fixture
-def hytf(capsys):
-    def call(*arguments):
-        with pytest.raises(SystemExit) as stop:
-            main([str(a) for a in arguments])
-        out, err = capsys.readouterr()
-        return stop.value.code, out, err
-
-    return call
 
 
 @pytest.fixture
