@@ -19,8 +19,6 @@ from fenics_hytf.lapse import (
     CycleCount,
     Energy,
     Equations,
-    Filling,
-    FillingSurvey,
     FreeField,
     FreeFieldState,
     Ground,
@@ -31,13 +29,11 @@ from fenics_hytf.lapse import (
     SlipState,
     Solved,
     Statics,
-    cell_stress,
     choose_continuity,
     convect,
     first_strain,
     seed_points,
     solve,
-    survey,
 )
 from fenics_hytf.motion import Segment
 from fenics_hytf.particles import (
@@ -62,7 +58,9 @@ from fenics_hytf.simulation.records import (
     SnapshotCallback,
     Work,
 )
+from fenics_hytf.simulation.schedule import lapses_to_go, motion_of, samples
 from fenics_hytf.simulation.snapshots import take_snapshot
+from fenics_hytf.simulation.weighing import Weighing
 from fenics_hytf.soil import CyclicState
 
 RealArray = npt.NDArray[np.float64]
@@ -107,8 +105,6 @@ class Run:
         self._strain_from = strain_from
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
-        self._filling: FillingSurvey | None = None
-        self._statics: Statics | None = None
         self._sliding: Sliding | None = None
         self._start_field: RealArray | float = 0.0
         self._owned: list[Equations | Continuity | Observation | Statics | Sliding | FreeField] = []
@@ -123,17 +119,17 @@ class Run:
             self.free_fields = self._level_ground()
             self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
             self._owned.append(self.equations)
-            if scene.effects.gravity is not None:
-                self._statics = Statics(scene, self.domain)
-                self._owned.append(self._statics)
+            statics = None if scene.effects.gravity is None else Statics(scene, self.domain)
+            if statics is not None:
+                self._owned.append(statics)
             self.continuity: Continuity = choose_continuity(
-                scene, self.domain, self.equations, self._statics
+                scene, self.domain, self.equations, statics
             )
             self._owned.append(self.continuity)
             if scene.effects.sliding is not None:
-                assert isinstance(self.continuity, Handover) and self._statics is not None
+                assert isinstance(self.continuity, Handover) and statics is not None
                 self._sliding = Sliding(
-                    scene, self.domain, self.equations, self.continuity, self._statics
+                    scene, self.domain, self.equations, self.continuity, statics
                 )
                 self._owned.append(self._sliding)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
@@ -141,10 +137,7 @@ class Run:
                 scene, self.domain, self.equations, self.continuity, self.points
             )
             self._owned.append(self.observation)
-            if scene.mesh.empty:
-                self._filling = FillingSurvey(scene, self.domain)
-            else:
-                self.observation.look_at(None)
+            self._weighing = Weighing(scene, self.domain, self.equations, self.observation, statics)
             cycles = scene.effects.degradation
             self._cycles = None if cycles is None else CycleCount(cycles, self.domain)
             names = self.domain.region_names
@@ -170,39 +163,13 @@ class Run:
         if self._ground is not None and not self.scene.effects.convection:
             return
         with self.clock.phase("assembly"):
-            filling = self._fill()
-            first, ground = (
-                self._ground is None,
-                survey(self.scene, self.domain, self.points, filling),
-            )
-            self._ground = ground
-            self.equations.weigh(self.points)
-            if self._statics is not None:
-                self._settle(self._statics, ground, first and not self.lapses)
-            if self.scene.effects.geometric_stiffness:
-                self.equations.stiffen(cell_stress(self.domain, self.points))
-
-    def _settle(self, statics: Statics, ground: Ground, first: bool) -> None:
-        """Static stress in balance at first, and again where something has slid."""
-        slid = bool(self.lapses) and self.lapses[-1].slip is not None and self.lapses[-1].slip.slid
-        if first:
-            statics.settle(self.points, ground)
-        elif slid:
-            statics.spread(self.points, ground, limit=np.inf)
-
-    def _fill(self) -> Filling | None:
-        """See how far points fill the cells, where the scene lets them leave any."""
-        if self._filling is None:
-            return None
-        filling = self._filling(self.points)
-        ledger = self.points.ledger(self.domain.comm)
-        self._ledger = replace(ledger, migrated=self._ledger.migrated)
-        others = self.equations.occupy(filling)
-        if others:
-            self.observation.look_at(filling.filled)
-        if self._statics is not None:
-            self._statics.occupy(filling, others)
-        return filling
+            before = self.lapses[-1].slip if self.lapses else None
+            at_first = self._ground is None and not self.lapses
+            slid = before is not None and before.slid
+            self._ground = self._weighing(self.points, at_first, slid)
+            if self.scene.mesh.empty:  # what came off is out
+                ledger = self.points.ledger(self.domain.comm)
+                self._ledger = replace(ledger, migrated=self._ledger.migrated)
 
     def solve_lapse(self, segment: Segment) -> Solved:
         """Transfer functions (5) of the lapse, with moduli that fit its strain."""
@@ -350,17 +317,10 @@ class Run:
         return None if slip is None else slip.total * slip.mechanism.field
 
     def segments(self) -> Iterator[Segment]:
-        """The lapses: as the scene says; or from one new mechanism to the next, and on to rest."""
-        planned = self.scene.segments
-        if self._sliding is None:
-            yield from planned[len(self.lapses) :]
-            return
-        length, end = planned[0].num_samples, planned[-1].stop
-        position = sum(lapse.num_samples for lapse in self.lapses)
-        while position < end or (self._sliding.moving and position < end + self.scene.rest_samples):
-            left = end - position if position < end else length
-            yield Segment(len(self.lapses), position, min(length, left))
-            position += self.lapses[-1].num_samples
+        """The lapses that are left; see :func:`~fenics_hytf.simulation.schedule.lapses_to_go`."""
+        sliding = self._sliding
+        moving = None if sliding is None else lambda: sliding.moving
+        return lapses_to_go(self.scene, self.lapses, moving)
 
     def _nodal_motion(self, solved: Solved, time: float, derivative: int = 0) -> RealArray:
         """Displacement of the nodes relative to the base, or a time derivative of it."""
@@ -369,7 +329,7 @@ class Run:
 
     def show(self, solved: Solved, index: int, snapshot: SnapshotCallback) -> None:
         """Hand points and fields to whoever writes them."""
-        time = sum(lapse.num_samples for lapse in self.lapses) * self.scene.dt
+        time = samples(self.lapses) * self.scene.dt
         with self.clock.phase("output"):
             if self.domain.across.rank > 0:  # the first group has it all
                 snapshot(Snapshot(index, time, None))
@@ -464,7 +424,7 @@ class Run:
             places=self.observation.receivers.places,
             region_names=self.domain.region_names,
             dt=self.scene.dt,
-            base_acceleration=self._base_acceleration(),
+            base_acceleration=motion_of(self.scene, self.lapses),
             lapses=tuple(self.lapses),
             sizes={
                 "cells": self.domain.num_cells,
@@ -474,9 +434,3 @@ class Run:
             work=self._work,
             peak_memory=self.comm.allreduce(peak_memory(), MPI.MAX),
         )
-
-    def _base_acceleration(self) -> RealArray:
-        """The motions, and nought where lapses go on after their end."""
-        given = self.scene.base_acceleration
-        after = sum(lapse.num_samples for lapse in self.lapses) - given.shape[1]
-        return np.pad(given, ((0, 0), (0, max(after, 0))))

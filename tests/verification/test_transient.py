@@ -28,7 +28,7 @@ from support.shear_column import (
 
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import Result, simulate
-from fenics_hytf.simulation import run as steps
+from fenics_hytf.simulation import weighing as steps
 
 # What a seam may cost, of the largest displacement, of the rms acceleration, of the velocity.
 SEAM_U, SEAM_A, SEAM_V = 5e-4, 5e-3, 1e-3
