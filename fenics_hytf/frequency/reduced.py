@@ -103,6 +103,7 @@ def reduced_sweep(
     budget: int | None = None,
     block: int = 10,
     across: MPI.Comm = MPI.COMM_SELF,
+    directions: Columns | None = None,
 ) -> ReducedSweep:
     """Solve A(s) x = b at every frequency by projection on a basis that grows as needed.
 
@@ -117,6 +118,7 @@ def reduced_sweep(
         block: Directions a factorisation is used for at first.
         across: Communicator of the ranks that hold the same part of the system and take expansion
             points of their own; the sweep is the same on all of them.
+        directions: Of a sweep of the same system, to begin with.
 
     Returns:
         The sweep.
@@ -132,6 +134,8 @@ def reduced_sweep(
     block = min(block, len(lines))  # a line alone needs no more than its solution
     with SymmetricFactorisation(system) as factorisation:
         growth = _Growth(system, factorisation, b, lines, tolerance, across)
+        if directions is not None:
+            growth.begin(directions)
         wanted = growth.first_expansions(expansions, block)
         while wanted:
             left = allowed - len(growth.expansions)
@@ -181,6 +185,12 @@ class _Growth:
     def worst(self) -> float:
         """Largest residual of the lines that were checked."""
         return float(self.residuals[self._checked].max(initial=0.0))
+
+    def begin(self, directions: Columns) -> None:
+        """Take directions of another sweep into the basis, from the first group."""
+        known = [block / self._products.scale[:, None] for block in directions.blocks]
+        mine = known if self._across.rank == 0 else []
+        self._basis.take(self._basis.fresh([(block, _DROP) for block in mine]))
 
     def expand(self, wanted: Sequence[tuple[int, int]]) -> None:
         """Factorise at lines, one a group, and take the directions found there into the basis.
@@ -286,10 +296,12 @@ class _Growth:
         """Where to begin: at known lines, or amid the lines, a point a group.
 
         And where s is real: a response at rest is real, which a projection on complex directions
-        is not; the solution itself is.
+        is not; the solution itself is. Where directions are known already, there alone.
         """
         count, groups = len(self._lines), self._across.size
         amid = [count * (2 * g + 1) // (2 * groups) for g in range(groups)] if count else []
+        if self._basis.size:
+            amid = []
         real = [line for line, s in enumerate(self._lines) if s.imag == 0]
         return [(line, block) for line in dict.fromkeys([*(known or amid), *real])]
 

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from fenics_hytf.frequency import (
     AffineLoads,
+    Columns,
     DynamicSystem,
     Loads,
     Sweep,
@@ -184,6 +185,7 @@ class _Sweeps:
         self._excitation, self._continuity, self._observer = excitation, continuity, observer
         self._change = 1.0
         self._expansions: tuple[int, ...] = ()
+        self._directions: Columns | None = None  # of the kernel
         self.tally = Tally()
         loop = scene.effects.equivalent_linear
         self.finest = self._solver.tolerance
@@ -247,9 +249,12 @@ class _Sweeps:
             raise GeometricInstability(negative)
 
     def again(self, loads: Sequence[PETSc.Vec] | Loads) -> Sweep:
-        """Sweep the equations of the last solution for other right-hand sides."""
+        """Sweep the equations of the last solution for other right-hand sides.
+
+        With the directions of the kernel to begin with: they are those of the same force.
+        """
         with self._observer.phase("sweep"):
-            return self._sweep(self.equations.system, loads, 0, None)
+            return self._sweep(self.equations.system, loads, 0, None, self._directions)
 
     def kernel(self, loads: AffineLoads, s: ComplexArray, tolerance: float) -> Sweep:
         """Sweep them at other complex frequencies."""
@@ -258,6 +263,7 @@ class _Sweeps:
             sweep = reduced_sweep(
                 self.equations.system, loads, s, tolerance, block=self._block, across=across
             )
+        self._directions = sweep.basis
         self.tally.factorisations += sweep.factorisations
         self.tally.solves += sweep.solves
         return sweep
@@ -268,6 +274,7 @@ class _Sweeps:
         loads: Sequence[PETSc.Vec] | Loads,
         iteration: int,
         tolerance: float | None,
+        directions: Columns | None = None,
     ) -> Sweep:
         """Sweep a system over the lines of the lapse."""
         arguments = system, loads, self._excitation.s
@@ -285,11 +292,14 @@ class _Sweeps:
                 *arguments,
                 self.tolerance,
                 report,
-                self._expansions,
+                self._expansions if directions is None else (),
                 block=self._block,
                 across=across,
+                directions=directions,
             )
-            self._expansions, sweep = reduced.expansions, reduced
+            sweep = reduced
+            if directions is None:
+                self._expansions = reduced.expansions
         self.tally.factorisations += sweep.factorisations
         self.tally.solves += sweep.solves
         return sweep

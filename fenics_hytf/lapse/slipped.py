@@ -78,10 +78,15 @@ class Slipped:
         """λ at the end of the lapse [m]."""
         return float(self.history.slip[-1])
 
+    def at_end(self, derivative: int = 0) -> RealArray:
+        """λφ or a derivative at the end of the lapse, shape ``(num_local_nodes, gdim)``."""
+        last = (self.history.slip, self.history.rate, self.history.acceleration)[derivative][-1]
+        return np.asarray(last * self.mechanism.field)
+
     def at_samples(self, derivative: int = 0) -> RealArray:
         """λ or a derivative at the samples of the lapse, shape ``(num_samples,)``."""
-        names = ("slip", "rate", "acceleration")
-        values = getattr(self.history, names[derivative])[: -1 : self.substeps].copy()
+        history = (self.history.slip, self.history.rate, self.history.acceleration)[derivative]
+        values = history[: -1 : self.substeps].copy()
         if derivative == 2:
             values[:1] *= 2  # the march takes half of what is there at its first step
         return np.asarray(values)

@@ -295,26 +295,22 @@ class Run:
         if not self.scene.effects.convection:
             return
         with self.clock.phase("convection"):
-            end = solved.excitation.duration
+            end, slip = solved.excitation.duration, solved.slip
+            u, v, a = (self._nodal_motion(solved, end, derivative) for derivative in range(3))
             report = convect(
                 self.domain,
                 self.points,
-                self._nodal_motion(solved, end) - self._nodal_motion(solved, 0.0),
+                u - self._nodal_motion(solved, 0.0),
                 self.scene.points.outside,
                 solved.material.real,
-                self._nodal_motion(solved, end, derivative=1),
-                self._nodal_motion(solved, end, derivative=2),
+                v if slip is None else v + slip.at_end(1),
+                a if slip is None else a + slip.at_end(2),
                 self._density,
-                self._slip(solved),
+                None if slip is None else slip.at_end(),
             )
         self._ledger = report.ledger
         self._work.inverse_mappings += report.inverse_mappings
         self.lapses[-1] = replace(self.lapses[-1], ledger=report.ledger)
-
-    def _slip(self, solved: Solved) -> RealArray | None:
-        """What has slipped of the nodes in the lapse [m]."""
-        slip = solved.slip
-        return None if slip is None else slip.total * slip.mechanism.field
 
     def segments(self) -> Iterator[Segment]:
         """The lapses that are left; see :func:`~fenics_hytf.simulation.schedule.lapses_to_go`."""
