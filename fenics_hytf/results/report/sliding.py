@@ -67,6 +67,12 @@ def _words(stored: StoredResult) -> Iterator[str]:
             "one under the response of ground that does not slip; both yield as the mechanism "
             "does, lapse by lapse. What the slip takes from the vibration, and gives to it, is in "
             "the coupled slip alone."
+            + (
+                " The ground of a lapse vibrates with what slip in the lapses before has left: the "
+                "decoupled block of a record in one lapse slides otherwise."
+                if len(summary["lapses"]) > 1
+                else ""
+            )
         )
     if told["note"] is not None:
         ratio = number(told["yield_over_peak"])
