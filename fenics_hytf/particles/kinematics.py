@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import expm
 
 from fenics_hytf.particles.geometry import RealArray, chunks
 from fenics_hytf.particles.points import Points
@@ -28,6 +27,35 @@ _PLACES = {3: ((0, 1, 0), (0, 1, 1)), 6: ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1)
 # Tensors that change within lapses and only turn with the ground between them, and what a shear
 # component stands for: γ = 2ε in strain.
 _TURNING = {"dynamic_strain": 2.0, "memory_strain": 2.0, "dynamic_stress": 1.0}
+
+
+_UNIT = 0.5  # norm up to which the exponential's series is summed as it is
+
+
+def exponentials(matrices: RealArray) -> RealArray:
+    """The exponential of many small matrices at once, (Σ_k (L/2ᵐ)ᵏ/k!)^2ᵐ to round-off.
+
+    Of a displacement's gradient a handful of terms is enough, where a routine made for one large
+    matrix spends its time on being called.
+
+    Args:
+        matrices: L [-], shape ``(n, dim, dim)``.
+
+    Returns:
+        exp(L), of the same shape.
+    """
+    largest = np.abs(matrices).sum(axis=2).max(initial=_UNIT)
+    squarings = int(np.ceil(np.log2(largest / _UNIT)))
+    scaled = matrices / 2.0**squarings
+    term, order = scaled, 1
+    total = np.eye(matrices.shape[1]) + term
+    while np.abs(term).max(initial=0.0) > np.finfo(np.float64).eps / 4:
+        order += 1
+        term = term @ scaled / order
+        total += term
+    for _ in range(squarings):
+        total = total @ total
+    return np.asarray(total)
 
 
 def to_tensor(components: RealArray) -> RealArray:
@@ -82,7 +110,7 @@ def rotate(columns: RealArray, gradient: RealArray, shear: float) -> RealArray:
     scale[gradient.shape[1] :] = shear
     for chunk in chunks(len(columns)):
         L = gradient[chunk]
-        R = expm(0.5 * (L - L.transpose(0, 2, 1)))
+        R = exponentials(0.5 * (L - L.transpose(0, 2, 1)))
         inner = int(np.prod(columns.shape[1:-1], dtype=int))
         flat = (columns[chunk] / scale).reshape(-1, len(scale))
         many = np.repeat(R, inner, axis=0)
@@ -124,7 +152,7 @@ def update_stress(
     updated = np.empty_like(stress)
     for chunk in chunks(len(stress)):
         L = gradient[chunk]
-        F = expm(L)
+        F = exponentials(L)
         sigma = to_tensor(stress[chunk]) + shear_modulus[chunk, None, None] * (
             L + L.transpose(0, 2, 1)
         )

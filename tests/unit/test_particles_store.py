@@ -20,6 +20,7 @@ from fenics_hytf.particles import (
     update_kinematics,
     update_stress,
 )
+from fenics_hytf.particles.kinematics import exponentials
 from fenics_hytf.particles.ledger import exact_sum, rounded
 from fenics_hytf.scene.faults import fault_from
 
@@ -251,6 +252,16 @@ def test_components_and_tensors(dim):
     assert np.array_equal(np.trace(tensor, axis1=1, axis2=2), components[:, :dim].sum(axis=1))
     assert np.array_equal(to_components(tensor), components)
     assert np.array_equal(tensor[:, 0, 1], components[:, -1])
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-3, 0.3, 1.0])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_exponentials_of_many_matrices(dim, size):
+    matrices = size * np.random.default_rng(dim).uniform(-1, 1, (50, dim, dim))
+    expected = np.stack([expm(matrix) for matrix in matrices])
+    # up to three squarings, each of which doubles what round-off there is
+    assert np.abs(exponentials(matrices) - expected).max() < 100 * EPS * np.abs(expected).max()
+    assert exponentials(matrices[:0]).shape == (0, dim, dim)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
