@@ -13,7 +13,7 @@ from fenics_hytf.frequency.errors import (
 from fenics_hytf.frequency.groups import share
 from fenics_hytf.frequency.inertia import negative_eigenvalues
 from fenics_hytf.frequency.loads import AffineLoads, Loads
-from fenics_hytf.frequency.products import multiply
+from fenics_hytf.frequency.products import multiply, real_rows
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
 from fenics_hytf.frequency.sweep import DenseSweep, JoinedSweep, Sweep
 from fenics_hytf.frequency.system import (
@@ -46,6 +46,7 @@ __all__ = [
     "multiply",
     "negative_eigenvalues",
     "radiation",
+    "real_rows",
     "reduced_sweep",
     "share",
 ]

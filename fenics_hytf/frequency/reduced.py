@@ -83,10 +83,14 @@ class ReducedSweep:
         # Rows take differences of neighbours, so they meet the basis in double precision.
         return lambda rows: self.basis.seen_by(rows).astype(self.precision) @ y
 
-    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+    @property
+    def has_directions(self) -> bool:
+        """Those of the basis; see :class:`Sweep`."""
+        return True
+
+    def on_directions(self, weights: ComplexArray) -> tuple[tuple[Columns, ...], ComplexArray]:
         """On the basis; see :class:`Sweep`."""
-        y = np.einsum("rsk,sk->rk", self.coordinates, weights)
-        return np.concatenate(self.basis.blocks, axis=1), y
+        return (self.basis,), np.einsum("rsk,sk->rk", self.coordinates, weights)
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from fenics_hytf.frequency.columns import Columns
+
 ComplexArray = npt.NDArray[np.complex128]
 
 
@@ -37,6 +39,14 @@ class Sweep(Protocol):
     def solves(self) -> int:
         """Solves with them."""
 
+    @property
+    def precision(self) -> type[np.complexfloating]:
+        """Of responses: single where the tolerance lets nothing finer through."""
+
+    @property
+    def has_directions(self) -> bool:
+        """Whether all solutions lie in few directions; see :meth:`on_directions`."""
+
     def solution(self, k: int) -> ComplexArray:
         """Return line ``k``'s solutions on this rank, shape ``(num_local, num_sides)``."""
 
@@ -57,19 +67,20 @@ class Sweep(Protocol):
             weights: Of each right-hand side at each line, shape ``(num_sides, num_lines)``.
 
         Returns:
-            What multiplies the response by matrices; in single precision where the tolerance of
-            the sweep lets nothing finer through.
+            What multiplies the response by matrices, in :attr:`precision`.
         """
 
-    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+    def on_directions(
+        self, weights: ComplexArray
+    ) -> tuple[tuple[Columns, ...] | None, ComplexArray]:
         """All lines of the weighed response on few directions.
 
         Args:
             weights: Of each right-hand side at each line, shape ``(num_sides, num_lines)``.
 
         Returns:
-            Directions on this rank, shape ``(num_local, n)``, or ``None`` for the unknowns
-            themselves; and coordinates, shape ``(n, num_lines)``.
+            Directions on this rank, n in all, or ``None`` for the unknowns themselves; and
+            coordinates, shape ``(n, num_lines)``.
         """
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
@@ -94,6 +105,9 @@ class DenseSweep:
         factorisations: Matrices factorised.
         solves: Solves.
     """
+
+    precision = np.complex128
+    has_directions = False
 
     def __init__(
         self,
@@ -156,6 +170,8 @@ class JoinedSweep:
         self.residuals = np.concatenate([part.residuals for part in parts], axis=1)
         self.factorisations = sum(part.factorisations for part in parts)
         self.solves = sum(part.solves for part in parts)
+        self.precision = np.result_type(*(part.precision for part in parts)).type
+        self.has_directions = all(part.has_directions for part in parts)
         self._splits = np.cumsum([part.residuals.shape[1] for part in parts])[:-1]
 
     def solution(self, k: int) -> ComplexArray:
@@ -172,14 +188,16 @@ class JoinedSweep:
         responses = [p.response(w) for p, w in zip(self._parts, shares, strict=True)]
         return lambda rows: np.asarray(sum(response(rows) for response in responses))
 
-    def on_directions(self, weights: ComplexArray) -> tuple[ComplexArray | None, ComplexArray]:
+    def on_directions(
+        self, weights: ComplexArray
+    ) -> tuple[tuple[Columns, ...] | None, ComplexArray]:
         """On the directions of all parts; see :class:`Sweep`."""
         shares = np.split(weights, self._splits)
         found = [p.on_directions(w) for p, w in zip(self._parts, shares, strict=True)]
-        directions = [V for V, _ in found if V is not None]
-        if len(directions) < len(found):
+        if not self.has_directions:
             return None, np.asarray(sum(y for _, y in found))
-        return np.concatenate(directions, axis=1), np.concatenate([y for _, y in found])
+        bases = tuple(basis for several, _ in found for basis in several or ())
+        return bases, np.concatenate([y for _, y in found])
 
     def combine(self, weights: ComplexArray) -> ComplexArray:
         """Sum all solutions with weights; see :class:`Sweep`."""

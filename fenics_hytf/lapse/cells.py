@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from fenics_hytf.frequency import share
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.response import Response, Spectra
+from fenics_hytf.lapse.sight import Sight, sight_of
 from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.operators import constrained_rows, displacement_rows, split_rows, strain_rows
 from fenics_hytf.particles import cell_centres, gradient_matrices, transfer_matrix
@@ -133,15 +135,15 @@ class CellProbe:
             The cells among this rank's, and their strain [-], shape
             ``(num_cells, num_strains, num_samples)``.
         """
-        weighed = response.weighed()
+        sight = sight_of(response, self._domain.comm)
         for cells, rows, _ in self._blocks:
-            for some, spectra in _by_few(cells, weighed(rows)):
-                yield some, self._strain(response, spectra, some, carried)
+            for some, seen in _by_few(cells, sight, rows):
+                yield some, self._strain(sight, seen, some, carried)
 
     def _strain(
-        self, response: Response, spectra: Spectra, some: slice, carried: CarriedCells | None
+        self, sight: Sight, seen: Any, some: slice, carried: CarriedCells | None
     ) -> RealArray:
-        history = response.history(spectra)
+        history = sight.history(seen)
         if carried is not None:
             history += carried.strain[some, :, None].astype(history.dtype)
         if self._empty is not None:
@@ -205,24 +207,26 @@ class CellProbe:
         """
         given, owned = response.excitation, self._domain.num_owned_cells
         peak = np.zeros((owned, 5))
-        stress = _StressHistories(response, material, self._domain.input_cells[:owned], carried)
+        sight = sight_of(response, self._domain.comm, material.parts)
+        stress = _StressHistories(sight, material, self._domain.input_cells[:owned], carried)
+        of_base = [response.history(base, derivative) for derivative in range(2)]
         motion = np.zeros((self._domain.num_components, given.num_samples))
         motion[list(given.axes)] = given.base_acceleration
-        weighed = response.weighed()
         for cells, strains, places in self._blocks:
-            for some, spectra in _by_few(cells, weighed(strains)):
-                strain = self._strain(response, spectra, some, carried)
-                for column, history in enumerate((strain, stress(spectra, some))):
+            for some, seen in _by_few(cells, sight, strains):
+                strain = self._strain(sight, seen, some, carried)
+                for column, history in enumerate((strain, stress(seen, some))):
                     peak[some, column] = peak_shear_strain(history, self._convention)
             moved = None if slip is None else _by_cell(slip.seen_by(places), cells)
-            for some, u in _by_few(cells, weighed(places)):
-                histories = [response.history(v, d) for d, v in enumerate((u - base, u - base, u))]
+            for some, seen in _by_few(cells, sight, places):
+                histories = [sight.history(seen, derivative) for derivative in range(3)]
                 if slip is not None and moved is not None:
                     for derivative, history in enumerate(histories):
                         there = moved[some.start - cells.start : some.stop - cells.start]
                         history += there[:, :, None] * slip.at_samples(derivative)
                 displacement, velocity, acceleration = histories
-                acceleration += motion.astype(acceleration.dtype)
+                for history, of in zip(histories, (-of_base[0], -of_base[1], motion), strict=True):
+                    history += of.astype(history.dtype)
                 if carried is not None:
                     displacement += carried.displacement[some, :, None].astype(displacement.dtype)
                 peak[some, 2] = peak_length(acceleration)
@@ -244,26 +248,17 @@ class _StressHistories:
 
     def __init__(
         self,
-        response: Response,
+        sight: Sight,
         material: Material,
         cells: npt.NDArray[np.int64],
         carried: CarriedCells | None,
     ) -> None:
+        self._sight, self._carried = sight, carried
         parts = material.parts
-        s = response.excitation.s
-        self._response, self._carried = response, carried
         self._moduli = np.stack([p.constants.shear_modulus[cells] for p in parts], axis=1)
-        self._functions = material.functions(s)
-        self._start = None if response.start is None else response.start_through(parts)
 
-    def __call__(self, spectra: Spectra, some: slice) -> RealArray:
-        moduli = self._moduli[some]
-        values = spectra.coefficients
-        factor = (moduli @ self._functions).astype(values.dtype)
-        history = self._response.excitation.to_time(factor[:, None, :] * values)
-        if self._start is not None and spectra.start is not None:
-            functions = np.tensordot(moduli, self._start, axes=1).astype(history.dtype)
-            history += spectra.start.astype(history.dtype) @ functions
+    def __call__(self, seen: Any, some: slice) -> RealArray:
+        history = self._sight.stress(seen, self._moduli[some])
         if self._carried is not None:
             # A lapse that a new mechanism cuts short is shorter than what was reckoned with.
             shares = self._carried.stress[some]
@@ -278,11 +273,10 @@ def _by_cell(values: RealArray, cells: slice) -> RealArray:
     return values.reshape(-1, len(values) // count) if len(values) else np.empty((0, 1))
 
 
-def _by_few(cells: slice, spectra: Spectra) -> Iterator[tuple[slice, Spectra]]:
-    """Rows of a block, a few cells at a time, ``(num_cells, num_values)`` of them."""
+def _by_few(cells: slice, sight: Sight, rows: PETSc.Mat) -> Iterator[tuple[slice, Any]]:
+    """What the rows of a block see, a few cells at a time (collective)."""
     count = cells.stop - cells.start
-    if count:
-        by_cell = spectra.reshape(count, len(spectra.coefficients) // count)
-        for first in range(0, count, _FEW):
-            stop = min(first + _FEW, count)
-            yield slice(cells.start + first, cells.start + stop), by_cell[first:stop]
+    seen = sight.see(rows, count)
+    for first in range(0, count, _FEW):
+        stop = min(first + _FEW, count)
+        yield slice(cells.start + first, cells.start + stop), seen[first:stop]

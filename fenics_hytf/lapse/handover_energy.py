@@ -15,7 +15,8 @@ from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.carried import FADING, State
-from fenics_hytf.lapse.energy import Course, Energy
+from fenics_hytf.lapse.course import Course
+from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.material import Material, Part
 from fenics_hytf.lapse.response import Response

@@ -182,8 +182,9 @@ class Run:
                 before = self._sliding.factorisations
                 self._sliding.begin(self.points, ground.filling)
                 self._work.factorisations += self._sliding.factorisations - before
-        excitation = self.continuity.excite(segment)
-        self.continuity.begin(self.points, excitation)
+        with self.clock.phase("assembly"):
+            excitation = self.continuity.excite(segment)
+            self.continuity.begin(self.points, excitation)
         observer = self._observer(index)
         for column in self.free_fields:
             self._count(column.solve(segment, self._observer(index, column.name)))
@@ -214,6 +215,7 @@ class Run:
         assert self._ground is not None
         with self.clock.phase("response"):
             seen = self.observation.see(solved, self._ground, self.points)
+            seam_error, energy = self._seam_error(solved, seen.cells), self._energy(solved)
         excitation, response = solved.excitation, solved.response
         self.lapses.append(
             LapseResult(
@@ -236,9 +238,9 @@ class Run:
                 within=seen.within,
                 outcrop=seen.outcrop,
                 cells=seen.cells,
-                seam_error=self._seam_error(solved, seen.cells),
+                seam_error=seam_error,
                 slip=seen.slip,
-                energy=self._energy(solved),
+                energy=energy,
                 ledger=self._ledger,
             )
         )

@@ -168,5 +168,7 @@ def test_joined_sweeps_are_one(sweep):
     rows.destroy()
 
 
-def _on_unknowns(V, y) -> np.ndarray:
-    return y if V is None else V @ y
+def _on_unknowns(bases, y) -> np.ndarray:
+    if bases is None:
+        return y
+    return np.concatenate([block for basis in bases for block in basis.blocks], axis=1) @ y

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: MIT
+"""What cells see of a response by its directions, against what they see by its lines."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.meshes import SOIL, scene
+
+from fenics_hytf.frequency import ReducedSweep
+from fenics_hytf.simulation import simulate
+
+WORLD = MPI.COMM_WORLD
+
+
+def shaken(law: str, tolerance: float):
+    """Two lapses that hand over, under a pulse."""
+    motion = {"synthetic": {"pga_g": 0.2, "dt": 0.02, "n": 100, "f1": 0.5, "f2": 5.0}}
+    return simulate(
+        scene(
+            {"box": {"size": [12.0, 6.0], "cells": [6, 3], "cell": "quadrilateral"}},
+            ("soil",),
+            soil={"soil": SOIL | {"damping": 0.05}},
+            motion=[motion | {"direction": "x"}],
+            boundary={"left": "dashpot", "right": "dashpot"},
+            lapses={"count": 2, "continuity": "transient"},
+            solver={"complex_modulus": law, "tolerance": tolerance},
+            output={"receivers": {"top": [6.0, 6.0]}},
+        ),
+        WORLD,
+    )
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("law", ["maxwell", "hysteretic"])
+@pytest.mark.parametrize(("tolerance", "kind"), [(1e-5, np.float32), (1e-9, np.float64)])
+def test_by_directions_and_by_lines(law, tolerance, kind, monkeypatch, figure):
+    limit = 100 * np.finfo(kind).eps  # sums of some hundred numbers, in the sweep's precision
+    by_directions = shaken(law, tolerance)
+    monkeypatch.setattr(ReducedSweep, "has_directions", False)
+    by_lines = shaken(law, tolerance)
+    for name in ("strain", "stress", "acceleration", "velocity", "displacement"):
+        worst = 0.0
+        for one, other in zip(by_directions.lapses, by_lines.lapses, strict=True):
+            found, expected = (getattr(lapse.cells, f"peak_{name}") for lapse in (one, other))
+            worst = max(worst, np.abs(found - expected).max() / expected.max())
+        figure(f"peak {name} by directions, {law}, tolerance {tolerance:g}", worst, limit)
