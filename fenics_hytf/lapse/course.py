@@ -138,15 +138,16 @@ class Course:
         if W is None or x.shape[1] < W.shape[1] // 2:
             u = x if W is None else W @ x
             return np.asarray(self._comm.allreduce(np.sum(u * _image(matrix, rows, u), axis=0)))
-        form = np.empty((W.shape[1], W.shape[1]))
+        form = np.zeros((W.shape[1], W.shape[1]))
         left = W.T
         if rows is not None and 2 * np.count_nonzero(np.diff(rows.indptr)) < len(W):
             some = np.flatnonzero(np.diff(rows.indptr))  # dashpots have few
             left, rows = W[some].T, rows[some]
         for first in range(0, W.shape[1], _AT_ONCE):
             columns = slice(first, first + _AT_ONCE)
-            form[:, columns] = left @ _image(matrix, rows, W[:, columns])
-        form = self._comm.allreduce(form)
+            form[first:, columns] = left[first:] @ _image(matrix, rows, W[:, columns])
+        lower = np.tril(self._comm.allreduce(form))
+        form = lower + np.tril(lower, -1).T
         return np.asarray(np.einsum("at,at->t", x, form @ x))
 
     def linear(self, vector: PETSc.Vec, x: RealArray) -> RealArray:

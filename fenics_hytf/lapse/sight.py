@@ -112,9 +112,9 @@ class _ByDirections:
         held = [None] * len(parts)
         if response.start is not None and parts:
             held = list(response.start_through(parts))
-        self._through: list[RealArray] = []
-        for factor, start in zip(_functions(parts, given.s), held, strict=True):
-            self._through.append(self._told(self._course.through(factor, start)))
+        functions = _functions(parts, given.s)
+        through = [self._course.through(f, start) for f, start in zip(functions, held, strict=True)]
+        self._through = self._told(np.concatenate(through)) if parts else None
 
     def _told(self, coordinates: RealArray) -> RealArray:
         return np.ascontiguousarray(coordinates[:, : self._samples], self._kind)
@@ -130,11 +130,10 @@ class _ByDirections:
         return _product(seen, self._coordinates[derivative])
 
     def stress(self, seen: RealArray, moduli: RealArray) -> RealArray:
-        total = np.zeros((*seen.shape[:-1], self._samples), seen.dtype)
-        for part, coordinates in enumerate(self._through):
-            modulus = moduli[:, part, None, None].astype(seen.dtype)
-            total += _product(modulus * seen, coordinates)
-        return total
+        assert self._through is not None
+        # All parts in one product, each part's coordinates met by the strain times its modulus.
+        weighed = moduli[:, None, :, None].astype(seen.dtype) * seen[:, :, None, :]
+        return _product(weighed.reshape(*seen.shape[:2], -1), self._through)
 
 
 def _functions(parts: tuple[Part, ...], s: npt.NDArray[np.complex128]) -> Any:

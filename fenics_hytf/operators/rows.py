@@ -30,7 +30,7 @@ def displacement_rows(S: sparse.csr_matrix, num_components: int) -> sparse.csr_m
     Returns:
         Shape ``(num_sites·num_components, num_local_nodes·num_components)``, components fastest.
     """
-    return sparse.csr_matrix(sparse.kron(S, sparse.identity(num_components)))
+    return _interleave([[(component, S)] for component in range(num_components)], num_components)
 
 
 def strain_rows(gradients: Sequence[sparse.csr_matrix], num_components: int) -> sparse.csr_matrix:
@@ -48,18 +48,12 @@ def strain_rows(gradients: Sequence[sparse.csr_matrix], num_components: int) -> 
         fastest.
     """
     gdim = len(gradients)
-    num_sites = gradients[0].shape[0]
     if num_components == 1:
-        return _interleave(gradients, num_sites)
+        return _interleave([[(0, gradient)] for gradient in gradients], 1)
     pairs = [(i, i) for i in range(gdim)]
     pairs += [(1, 2), (0, 2), (0, 1)] if gdim == 3 else [(0, 1)]
-    parts = []
-    for i, j in pairs:
-        part = sparse.kron(gradients[j], _unit(i, gdim))
-        if i != j:
-            part = part + sparse.kron(gradients[i], _unit(j, gdim))
-        parts.append(part)
-    return _interleave(parts, num_sites)
+    rows = [[(i, gradients[j]), (j, gradients[i])][: 1 + (i != j)] for i, j in pairs]
+    return _interleave(rows, num_components)
 
 
 def divergence_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix:
@@ -72,20 +66,31 @@ def divergence_rows(gradients: Sequence[sparse.csr_matrix]) -> sparse.csr_matrix
     Returns:
         Shape ``(num_sites, num_local_nodes·gdim)``, components fastest.
     """
-    gdim = len(gradients)
-    parts = [sparse.kron(gradient, _unit(i, gdim)) for i, gradient in enumerate(gradients)]
-    return sparse.csr_matrix(sum(parts[1:], parts[0]))
+    return _interleave([list(enumerate(gradients))], len(gradients))
 
 
-def _interleave(parts: Sequence[sparse.csr_matrix], num_sites: int) -> sparse.csr_matrix:
-    """Rows of all parts, site by site."""
-    stacked = sparse.csr_matrix(sparse.vstack(parts))
-    order = np.arange(len(parts) * num_sites).reshape(len(parts), num_sites).T.ravel()
-    return stacked[order]
+def _interleave(
+    rows: Sequence[Sequence[tuple[int, sparse.csr_matrix]]], num_components: int
+) -> sparse.csr_matrix:
+    """Rows of all sites, each kind of row a sum of matrices on some components.
 
-
-def _unit(component: int, gdim: int) -> sparse.csr_matrix:
-    return sparse.csr_matrix(([1.0], ([0], [component])), shape=(1, gdim))
+    The matrices have the same places, as many in every row: the result's arrays are those of theirs
+    side by side, which takes a tenth of the time of Kronecker products.
+    """
+    first = rows[0][0][1]
+    num_sites, num_nodes = first.shape
+    width = first.nnz // max(num_sites, 1)
+    nodes = first.indices.reshape(num_sites, width)
+    parts = [part for row in rows for part in row]
+    values = np.stack([matrix.data.reshape(num_sites, width) for _, matrix in parts], axis=1)
+    offsets = np.array([component for component, _ in parts], nodes.dtype)
+    columns = num_components * nodes[:, None, :] + offsets[:, None]
+    ends = width * np.cumsum([len(row) for row in rows])
+    start = np.arange(num_sites)[:, None] * ends[-1] + np.concatenate([[0], ends[:-1]])
+    return sparse.csr_matrix(
+        (values.ravel(), columns.ravel(), np.append(start.ravel(), values.size)),
+        shape=(num_sites * len(rows), num_nodes * num_components),
+    )
 
 
 def constrained_rows(domain: Domain, local: sparse.csr_matrix, T: PETSc.Mat) -> PETSc.Mat:
