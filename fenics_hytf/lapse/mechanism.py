@@ -300,13 +300,20 @@ class _Search:
     ) -> RealArray:
         """The combination of some directions that lowers F most; the first one is a good guess."""
         fields = [flow, *directions]
-        strains = np.stack([self._strain(field) for field in fields])
-        products = np.einsum("icgs,jcgs->cgij", strains, strains)
+        soil = self._volume > 0
+        strains = [self._strain(field)[soil] for field in fields]
+        i, j = np.triu_indices(len(fields))
+        products = np.stack(
+            [np.einsum("ns,ns->n", strains[a], strains[b]) for a, b in zip(i, j, strict=True)]
+        )
+        volume, strength = self._volume[soil], self._strength[soil]
         work = np.array([self._work(self._gravity, field) for field in fields])
         share = (np.arange(len(fields)) < 2).astype(float)
+        K = np.empty((len(fields), len(fields)))
         for _ in range(_PLANE_ITERATIONS):
-            moduli = self._moduli(products @ share @ share, smoothing)
-            K = self._sum(np.einsum("cg,cgij->ij", self._volume * moduli, products))
+            squares = (np.where(i == j, 1.0, 2.0) * share[i] * share[j]) @ products
+            moduli = strength / np.sqrt(squares + smoothing**2)
+            K[i, j] = K[j, i] = self._sum(products @ (volume * moduli))
             share[1:] = _solve(K[1:, 1:], (work - K[0])[1:])
         return np.asarray(share[1:] @ np.array(directions))
 
