@@ -23,12 +23,11 @@ from support.meshes import scene
 from support.reference import comb
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.lapse import CellPeaks, CellProbe, Ground, Response, survey
+from fenics_hytf.lapse import CellPeaks, CellProbe, Filling, Ground, Response, survey
 from fenics_hytf.particles import Points
 from fenics_hytf.results import open_result
 from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import peak_memory, simulate
-from fenics_hytf.simulation import run as steps
+from fenics_hytf.simulation import peak_memory, simulate, weighing
 
 SOIL = {"density": 1900.0, "shear_wave_velocity": 250.0, "poisson": 0.3}
 
@@ -102,9 +101,11 @@ def random_scene(
     )
 
 
-def random_ground(case: Scene, domain: Domain, points: Points) -> Ground:
+def random_ground(
+    case: Scene, domain: Domain, points: Points, filling: Filling | None = None
+) -> Ground:
     """The ground of a scene with a random stiffness in every cell."""
-    ground = survey(case, domain, points)
+    ground = survey(case, domain, points, filling)
     spread = np.exp(0.4 * np.random.default_rng(7).normal(size=domain.num_cells))
     return replace(ground, shear_modulus=spread * ground.shear_modulus)
 
@@ -137,7 +138,7 @@ def measure(order: dict) -> dict | None:
     """
     order = {**order}
     options = {"group_size": order.pop("group_size")} if "group_size" in order else {}
-    steps.survey = random_ground
+    weighing.survey = random_ground
     taken = _time_peaks()
     comm = MPI.COMM_WORLD
     with tempfile.TemporaryDirectory() as name:
