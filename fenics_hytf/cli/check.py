@@ -10,9 +10,9 @@ import typer
 from mpi4py import MPI
 
 from fenics_hytf.cli.collective import at_root, load_scene
-from fenics_hytf.cli.outcome import DONE, InputError, RunRequest
+from fenics_hytf.cli.outcome import DONE, InputError, RunRequest, tell
 from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import Inspection, inspect
+from fenics_hytf.simulation import Inspection, factor_of_safety, inspect
 
 
 def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -> int:
@@ -28,7 +28,8 @@ def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -
 
     Raises:
         InputError: With every fault of the scene and of the file; nothing is written then.
-        SceneError: A fault that only the mesh shows.
+        SceneError: A fault that only the mesh shows, or a slope that does not stand at rest.
+        SimulationError: The search for its factor of safety stopped.
         WriteError: If the figure could not be written.
     """
     scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
@@ -36,9 +37,12 @@ def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -
         faults += comm.bcast(at_root(comm, lambda: figure_faults(plot)))
     if scene is None or faults:
         raise InputError(faults)
-    inspection = inspect(scene, comm)
+    inspection, safety = inspect(scene, comm), None
+    if scene.effects.sliding is not None:
+        tell(["looking for the factor of safety at rest: some tens of factorisations"])
+        safety = factor_of_safety(scene, comm)
     if comm.rank == 0:
-        typer.echo(describe(inspection))
+        typer.echo(describe(inspection, safety))
     if plot is not None:
         drawn = at_root(comm, lambda: draw(scene, plot))
         if drawn is not None:
@@ -72,8 +76,13 @@ def draw(scene: Scene, path: Path) -> str:
     return f"{path} ({count} soil{'s' if count > 1 else ''})"
 
 
-def describe(inspection: Inspection) -> str:
-    """The answer for a scene without faults."""
+def describe(inspection: Inspection, safety: float | None = None) -> str:
+    """The answer for a scene without faults.
+
+    Args:
+        inspection: What it asks for.
+        safety: Its factor of safety at rest, where it may slide.
+    """
     lines = inspection.lines
     lapses = f"{inspection.lapses} of {inspection.samples_per_lapse} samples"
     low, high = min(lines), max(lines)
@@ -90,6 +99,14 @@ def describe(inspection: Inspection) -> str:
         ("lines to solve", solved),
         ("factorisations", f"at most {inspection.factorisations}"),
         ("memory", f"about {inspection.memory_bytes / 2**20:.0f} MiB"),
+        *([] if safety is None else [("stability", _stability(safety))]),
         *(("note", note) for note in inspection.notes),
     ]
     return "\n".join(["ok", *(f"  {name:15s} {text}" for name, text in rows)])
+
+
+def _stability(safety: float) -> str:
+    if safety == float("inf"):
+        return "no factor of safety at rest: gravity shears nothing"
+    falls = ", and unstable_at_rest lets it go" if safety < 1 else ""
+    return f"factor of safety at rest {safety:.3g}{falls}"

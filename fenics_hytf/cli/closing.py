@@ -52,9 +52,10 @@ def _slip(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
     told = summary["sliding"]
     if told is None:
         return []
-    rest = told["at_rest_s"]
-    words = (
-        f"factor of safety {told['factor_of_safety']:.3g}, k_y {told['yield_coefficient']:.3g}; "
+    rest, safety = told["at_rest_s"], told["factor_of_safety"]
+    words = "" if safety is None else f"factor of safety {safety:.3g}, "
+    words += (
+        f"k_y {told['yield_coefficient']:.3g}; "
         f"slip {told['slip_m']:.3g} m (decoupled {told['decoupled_m']:.3g}, rigid "
         f"{told['rigid_m']:.3g}), "
     )

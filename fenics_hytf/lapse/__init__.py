@@ -33,6 +33,7 @@ from fenics_hytf.lapse.run import Observer, Solved, solve
 from fenics_hytf.lapse.scheme import Scheme, scheme_of
 from fenics_hytf.lapse.sliding import Sliding
 from fenics_hytf.lapse.slipped import Slipped, SlipState
+from fenics_hytf.lapse.slope import Slope
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.lapse.whole_record import WholeRecord
@@ -80,6 +81,7 @@ __all__ = [
     "SlipResult",
     "SlipState",
     "Slipped",
+    "Slope",
     "Solved",
     "Spectra",
     "Statics",

@@ -47,6 +47,9 @@ _SMOOTHING = 1e-5  # ε over the largest s; 1e-4 raises the height of a vertical
 _TOLERANCE, _WINDOW = 1e-4, 3
 _LIMIT = 150
 _BOTTOMLESS = -100.0  # accelerations of gravity; F then falls for ever
+# Share of what a flow takes that must go into shear for a mechanism: a hundredth is left where soil
+# is pressed together, and more than nine tenths in slip surfaces at 30 times the strength.
+_SHEARED = 0.5
 _PLANE_ITERATIONS = 10  # 20 save at most one factorisation in thirty, 5 cost two more
 
 
@@ -163,8 +166,9 @@ class MechanismSearch:
     ) -> float:
         """The factor by which the strength exceeds what the ground needs at rest (collective).
 
-        min ∫ τ_f s dV over the flows with f_g·u = 1: gravity drives and there is no other load.
-        Very large where gravity drives nothing, as in level ground.
+        min ∫ τ_f s dV over the flows with f_g·u = 1: gravity drives and there is no other load. In
+        level ground the best flow is one that presses soil together, which s allows for a hundred
+        times the strength: no factor of safety follows from that.
 
         Args:
             T: As for :meth:`find`, as are the others.
@@ -173,14 +177,16 @@ class MechanismSearch:
             gravity: Weight on the unknowns.
 
         Returns:
-            The factor of safety [-].
+            The factor of safety [-]; infinite where gravity shears nothing.
 
         Raises:
             ValueError: As :meth:`find`.
             MechanismError: As :meth:`find`.
             FactorisationError: As :meth:`find`.
         """
-        return self.find(T, weight, strength, None, gravity).yield_coefficient
+        found = self.find(T, weight, strength, None, gravity)
+        sheared = found.dissipation / found.driving / found.functional[-1]
+        return found.yield_coefficient if sheared > _SHEARED else np.inf
 
 
 class _Search:

@@ -80,7 +80,7 @@ class SlipResult:
 
     Attributes:
         yield_coefficient: k_y [-].
-        factor_of_safety: At rest, before shaking [-].
+        factor_of_safety: At rest, before shaking [-]; infinite where gravity shears nothing.
         direction: Component in which the mechanism is driven.
         sense: Of the motion that drives it along that, 1 or -1.
         time_step: Of the march [s].

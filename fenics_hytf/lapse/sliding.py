@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Permanent displacement over lapses: which mechanism yields, and how one gives way to the next.
 
-At the start of a lapse the strength of every cell follows from the stress that points carry
-(Mohr and Coulomb), and the mechanism φ that yields first is sought, with its k_y. In the lapse it
-slips (:mod:`.slip`). Points carry φ, which moves with them; as one mechanism gives way to the next,
-what it has of the new one's motion goes on as slip, and the rest as vibration:
+At the start of a lapse the mechanism φ that yields first is sought, with its k_y (:mod:`.slope`).
+In the lapse it slips (:mod:`.slip`). Points carry φ, which moves with them; as one mechanism gives
+way to the next, what it has of the new one's motion goes on as slip, and the rest as vibration:
 
     λ̇ ← (φᵀMφ_old) λ̇/(φᵀMφ)
 """
@@ -24,21 +23,18 @@ from fenics_hytf.lapse.continuity import Solve
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.handover import Handover
-from fenics_hytf.lapse.mechanism import Mechanism, MechanismSearch
+from fenics_hytf.lapse.mechanism import Mechanism
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.slip import Kernel, LapseSlip
 from fenics_hytf.lapse.slipped import Slipped, SlipState
+from fenics_hytf.lapse.slope import Slope
 from fenics_hytf.lapse.starts import product
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.particles import Points, transfer_matrix
-from fenics_hytf.scene import Fault, Scene, SceneError
-from fenics_hytf.soil import shear_strength
+from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
 
-# Of the largest strength: what soil without cohesion and confinement is given. Soil beside rock has
-# a thousandth of its strength, and a search found mechanisms between strengths 2e5 apart.
-_LEAST_STRENGTH = 1e-6
 # Of k_y, by which a mechanism has to yield sooner than another one to be taken before it.
 _SOONER = 1e-3
 
@@ -67,30 +63,22 @@ class Sliding:
     ) -> None:
         assert scene.effects.sliding is not None and scene.effects.gravity is not None
         self._domain, self._equations = domain, equations
-        self._handover, self._statics = handover, statics
+        self._handover, self._slope = handover, Slope(scene, domain, statics)
         self._settings, self._g = scene.effects.sliding, scene.effects.gravity.acceleration
-        soils = [scene.soil[name] for name in domain.region_names]
-        self._cohesion = np.array([soil.cohesion or 0.0 for soil in soils])
-        self._friction_angle = np.array([soil.friction_angle or 0.0 for soil in soils])
-        self._search = MechanismSearch(domain)
         moves = scene.effects.convection
         self._most_slip = self._settings.new_mechanism * cell_size(domain) if moves else None
         self.state: SlipState | None = None
         self._mechanism: Mechanism
         self._unknowns: RealArray
-        # Of the points at the start of a lapse.
-        self._weight: RealArray
-        self._strength: RealArray
-        self._gravity: PETSc.Vec
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        self._search.destroy()
+        self._slope.destroy()
 
     @property
     def factorisations(self) -> int:
         """Of secant stiffnesses, over all lapses."""
-        return self._search.factorisations
+        return self._slope.factorisations
 
     @property
     def moving(self) -> bool:
@@ -109,42 +97,18 @@ class Sliding:
             SceneError: The slope does not stand before it is shaken.
             MechanismError: No mechanism was found.
         """
-        local = self._domain.input_cells
-        self._weight = np.ones(len(local)) if filling is None else filling.weight[local]
-        self._strength = self._cell_strength(points)[local]
-        self._gravity = self._statics.unknowns.collect(self._statics.weight_of(points))
+        self._slope.weigh(points, filling)
         if self.state is None:
             self._mechanism, self.state = self._first()
         else:
             self._mechanism = self._next(points, self.state)
-        self._gravity.destroy()
         self.state = self._give_way(points, self.state)
         self._handover.steady_slip = (self._unknowns, self.state.rate)
-
-    def _cell_strength(self, points: Points) -> RealArray:
-        """Mean shear strength of every cell by volume [Pa]; 1 where there is no soil."""
-        gdim = self._domain.gdim
-        pressure = -points["stress"][:, :gdim].mean(axis=1)
-        cohesion = self._cohesion[points.region]
-        strength = shear_strength(cohesion, self._friction_angle[points.region], pressure)
-        sums, one = np.zeros((self._domain.num_owned_cells, 2)), np.ones(len(points))
-        np.add.at(sums, points.cell, points.volume[:, None] * np.stack([one, strength], axis=1))
-        volume, total = self._domain.gather_cells(sums).T
-        mean = total / np.where(volume > 0, volume, 1.0)
-        return np.where(volume > 0, np.maximum(mean, _LEAST_STRENGTH * mean.max()), 1.0)
 
     def _first(self) -> tuple[Mechanism, SlipState]:
         """The mechanism with the least k_y, over both senses of every horizontal motion."""
         level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
-        if not level:
-            expected = "one along the ground, which drives what slides"
-            raise SceneError([Fault("motion", "vertical motion alone", expected)])
-        T = self._statics.unknowns.T
-        safety = self._search.factor_of_safety(T, self._weight, self._strength, self._gravity)
-        if safety < 1 and not self._settings.unstable_at_rest:
-            found = f"a slope with a factor of safety of {safety:.3g} at rest"
-            expected = "more than 1 before it is shaken, or unstable_at_rest = true to let it go"
-            raise SceneError([Fault("effects.sliding", found, expected)])
+        safety = self._slope.factor_of_safety()
         ways = [(axis, sense) for axis in level for sense in (1, -1)]
         candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
         first = candidates[0]
@@ -163,14 +127,8 @@ class Sliding:
         return self._find(state.axis, state.sense, start)
 
     def _find(self, axis: int, sense: int, start: RealArray | None = None) -> Mechanism:
-        T = self._statics.unknowns.T
-        driving = T.createVecRight()
-        T.multTranspose(self._equations.influence[self._equations.axes.index(axis)], driving)
-        driving.scale(sense * self._g)
-        try:
-            return self._search.find(T, self._weight, self._strength, self._gravity, driving, start)
-        finally:
-            driving.destroy()
+        inertia = self._equations.influence[self._equations.axes.index(axis)]
+        return self._slope.find(inertia, sense * self._g, start)
 
     def _momentum(self, points: Points) -> PETSc.Vec:
         """SᵀM_p φ of the mechanism that points carry; the caller destroys it."""

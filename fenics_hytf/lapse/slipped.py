@@ -23,7 +23,7 @@ class SlipState:
         rate: λ̇ [m/s].
         rigid_rate: Of a rigid block [m/s].
         decoupled_rate: Of a rigid block under the linear response [m/s].
-        factor_of_safety: At rest, before shaking [-].
+        factor_of_safety: At rest, before shaking [-]; infinite where gravity shears nothing.
         axis: Component in which the mechanism is driven.
         sense: Of the motion that drives it along the axis, 1 or -1.
     """

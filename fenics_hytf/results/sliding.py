@@ -37,7 +37,8 @@ def slip_record(scene: Scene, lapse: LapseResult) -> dict[str, Any] | None:
     Returns:
         Plain values, keys carry their units: ``rigid_m`` and ``decoupled_m`` are the slips of a
         rigid block and of one under the linear response; ``yield_over_peak`` is k_y/k_max,
-        ``None`` where nothing drives the mechanism; ``note`` says where that is too much for the
+        ``None`` where nothing drives the mechanism; ``factor_of_safety`` is ``None`` where gravity
+        alone shears nothing; ``note`` says where that is too much for the
         slip to be trusted. ``None`` where the scene does not call for sliding.
     """
     slip = lapse.slip
@@ -46,7 +47,7 @@ def slip_record(scene: Scene, lapse: LapseResult) -> dict[str, Any] | None:
     ratio = _yield_over_peak(scene, slip)
     return {
         "yield_coefficient": slip.yield_coefficient,
-        "factor_of_safety": slip.factor_of_safety,
+        "factor_of_safety": _safety(slip),
         "direction": slip.direction,
         "sense": slip.sense,
         "slip_m": float(slip.slip[-1]),
@@ -71,11 +72,11 @@ def slide(result: Result) -> dict[str, Any] | None:
         result: The simulation.
 
     Returns:
-        Sums of the lapses' slips; the factor of safety at rest; k_y of the first and the last
-        lapse; ``yield_over_peak``, the least k_y/k_max of a lapse; ``note`` as for a lapse; and
-        ``at_rest_s``, the time from which on nothing slips: nought where nothing ever does,
-        ``None`` where the run ends while something slips. ``None`` where the scene does not call
-        for sliding.
+        Sums of the lapses' slips; the factor of safety at rest, as for a lapse; k_y of the first
+        and the last lapse; ``yield_over_peak``, the least k_y/k_max of a lapse; ``note`` as for a
+        lapse; and ``at_rest_s``, the time from which on nothing slips: nought where nothing ever
+        does, ``None`` where the run ends while something slips. ``None`` where the scene does not
+        call for sliding.
     """
     slips = _slips(result)
     if not slips:
@@ -87,7 +88,7 @@ def slide(result: Result) -> dict[str, Any] | None:
         "slip_m": float(sum(slip.slip[-1] for slip in slips)),
         "rigid_m": sum(slip.rigid for slip in slips),
         "decoupled_m": sum(slip.decoupled for slip in slips),
-        "factor_of_safety": slips[0].factor_of_safety,
+        "factor_of_safety": _safety(slips[0]),
         "yield_coefficient": slips[0].yield_coefficient,
         "yield_coefficient_last": slips[-1].yield_coefficient,
         "yield_over_peak": ratio,
@@ -152,6 +153,10 @@ def slip_warnings(result: Result) -> list[str]:
 
 def _slips(result: Result) -> list[SlipResult]:
     return [lapse.slip for lapse in result.lapses if lapse.slip is not None]
+
+
+def _safety(slip: SlipResult) -> float | None:
+    return slip.factor_of_safety if np.isfinite(slip.factor_of_safety) else None
 
 
 def _gravity(scene: Scene) -> float:

@@ -17,6 +17,7 @@ from fenics_hytf.simulation.records import (
     SnapshotCallback,
     Work,
 )
+from fenics_hytf.simulation.stability import factor_of_safety
 
 __all__ = [
     "Checkpoint",
@@ -30,6 +31,7 @@ __all__ = [
     "Snapshot",
     "SnapshotCallback",
     "Work",
+    "factor_of_safety",
     "group_faults",
     "inspect",
     "mesh_faults",

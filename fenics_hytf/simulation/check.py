@@ -54,6 +54,7 @@ def mesh_faults(
     except SceneError as error:
         faults += error.faults
     faults += _locking_faults(scene, domain)
+    faults += _sliding_faults(scene, domain)
     if scene.output is not None:
         faults += receiver_faults(domain, scene.output.receivers)
     if scene.boundary is not None and not faults:
@@ -95,6 +96,16 @@ def _locking_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
         return []
     expected = "quadrilaterals or hexahedra, or degree 2"
     return [Fault("effects.locking", f"{name} of degree 1", expected)]
+
+
+def _sliding_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
+    """What slides is driven along the ground."""
+    directions = {motion.direction for motion in scene.motion if motion is not None}
+    slides = scene.effects is not None and scene.effects.sliding is not None
+    if not slides or directions != {domain.components[-1]} or domain.num_components == 1:
+        return []
+    expected = "one along the ground, which drives what slides"
+    return [Fault("motion", "vertical motion alone", expected)]
 
 
 def _boundary_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:

@@ -16,6 +16,7 @@ import pytest
 from PIL import Image
 
 from fenics_hytf.cli import main
+from fenics_hytf.cli.closing import closing_words
 from fenics_hytf.motion import GRAVITY
 from fenics_hytf.results import ResultError, open_result, publish, read_result, read_table
 from fenics_hytf.results.figures import animation, style
@@ -131,6 +132,19 @@ def test_nothing_that_drives_it_has_no_ratio(tmp_path):
     summary = write(tmp_path / "r", replace(result, lapses=lapses))
     assert summary["lapses"][3]["slip"]["yield_over_peak"] is None
     assert summary["sliding"]["yield_over_peak"] == pytest.approx(0.1 / 0.3, rel=2e-3)
+
+
+def test_ground_that_gravity_does_not_shear_has_no_factor_of_safety(tmp_path):
+    """JSON knows no infinity; nor do a report and the closing words."""
+    result = make_slide()
+    level = [
+        replace(lapse, slip=replace(lapse.slip, factor_of_safety=np.inf)) for lapse in result.lapses
+    ]
+    summary = write(tmp_path / "r", replace(result, lapses=tuple(level)))
+    text = (tmp_path / "r/summary.json").read_text(encoding="utf-8")
+    assert "Infinity" not in text and json.loads(text)["sliding"]["factor_of_safety"] is None
+    assert what_slid(summary).endswith("gravity alone does not shear it.")
+    assert re.search(r"sliding +k_y 0\.1; slip", closing_words(summary, tmp_path, False))
 
 
 def test_without_sliding_there_is_nothing_of_it(tmp_path):

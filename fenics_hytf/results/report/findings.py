@@ -30,7 +30,10 @@ _MOST_LAPSES = 6  # whose layers are listed
 def what_slid(summary: Summary) -> str:
     """What the slope did, in one line."""
     told, lapse = summary["sliding"], summary["lapses"][-1]
-    safety = f"its factor of safety at rest was {number(told['factor_of_safety'])}"
+    factor = told["factor_of_safety"]
+    safety = "gravity alone does not shear it"
+    if factor is not None:
+        safety = f"its factor of safety at rest was {number(factor)}"
     if not told["slip_m"] > 0.0:
         ratio = told["yield_over_peak"]
         drive = (
