@@ -27,13 +27,20 @@ from fenics_hytf.lapse.handover import Handover
 from fenics_hytf.lapse.material import ElasticConstants, Material, Part, material
 from fenics_hytf.lapse.mechanism import Mechanism, MechanismError, MechanismSearch
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
-from fenics_hytf.lapse.records import CellState, LapseResult, LoopHistory, SlipResult
+from fenics_hytf.lapse.records import (
+    CellState,
+    LapseResult,
+    LoopHistory,
+    SlipResult,
+    SofteningResult,
+)
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
 from fenics_hytf.lapse.run import Observer, Solved, solve
 from fenics_hytf.lapse.scheme import Scheme, scheme_of
 from fenics_hytf.lapse.sliding import Sliding
 from fenics_hytf.lapse.slipped import Slipped, SlipState
 from fenics_hytf.lapse.slope import Slope
+from fenics_hytf.lapse.softening import Softening
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.lapse.whole_record import WholeRecord
@@ -82,6 +89,8 @@ __all__ = [
     "SlipState",
     "Slipped",
     "Slope",
+    "Softening",
+    "SofteningResult",
     "Solved",
     "Spectra",
     "Statics",

@@ -356,6 +356,7 @@ def _level_ground(scene: Scene, gdim: int) -> Scene:
         "geometric_stiffness": False,
         "gravity": None,
         "sliding": None,
+        "softening": False,
         "calm": None,
         "degradation": None,
     }

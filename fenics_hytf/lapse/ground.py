@@ -128,9 +128,13 @@ def seed_points(
     count = scene.mesh.points_in(domain.mesh.topology.cell_name())
     regions = np.where(domain.regions < 0, len(density), domain.regions).astype(np.int32)
     points = seed(domain.mesh, regions, [*density, 0.0], count, fields)
+    if scene.effects.softening:
+        vectors |= {"softest": (), "permanent_displacement": (domain.num_components,)}
     for name, shape in (*vectors.items(), *carried.items()):
         if name not in points.history:
             points.add(name, shape)
+    if scene.effects.softening:
+        points["softest"][...] = 1.0
     return points
 
 

@@ -132,6 +132,19 @@ def elastic_constants(ground: Ground, solver: Solver) -> ElasticConstants:
     return ElasticConstants(_lame(ground, ground.shear_modulus, solver.keep), ground.shear_modulus)
 
 
+def with_bulk_kept(ground: Ground, shear_modulus: RealArray) -> ElasticConstants:
+    """Constants of cells whose deviator alone has softened.
+
+    Args:
+        ground: The ground.
+        shear_modulus: G of every cell [Pa], shape ``(num_cells,)``.
+
+    Returns:
+        The constants, with the bulk modulus of small strain.
+    """
+    return ElasticConstants(_lame(ground, shear_modulus, "bulk"), shear_modulus)
+
+
 def _lame(ground: Ground, G: npt.NDArray[Any], keep: str) -> npt.NDArray[Any]:
     """λ that belongs to a shear modulus, real or complex."""
     nu = ground.poisson

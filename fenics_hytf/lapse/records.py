@@ -119,6 +119,23 @@ class SlipResult:
 
 
 @dataclass(frozen=True)
+class SofteningResult:
+    """What the stiffness-reduction estimate has come to at the end of a lapse.
+
+    Attributes:
+        softest: Least G over its small-strain value up to then, all cells in the order of the input
+            [-], shape ``(num_cells,)``.
+        displacement: Permanent displacement of the receivers since the start [m], shape
+            ``(num_receivers, num_components)``.
+        largest: That of the point that has moved farthest [m].
+    """
+
+    softest: RealArray
+    displacement: RealArray
+    largest: float
+
+
+@dataclass(frozen=True)
 class LapseResult:
     """One lapse.
 
@@ -151,6 +168,7 @@ class LapseResult:
         energy: Energy ledger, or ``None`` under ``steady`` continuity or a law that is not causal.
         ledger: Points and their mass after the lapse's convective phase.
         slip: What slipped, or ``None`` where the scene does not call for sliding.
+        softening: What softening has brought, or ``None`` where the scene does not call for it.
     """
 
     index: int
@@ -176,3 +194,4 @@ class LapseResult:
     energy: Energy | None
     ledger: MassLedger
     slip: SlipResult | None = None
+    softening: SofteningResult | None = None

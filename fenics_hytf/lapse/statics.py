@@ -7,8 +7,10 @@ Gravity is switched on in elastic ground, K u = f_g. Where K0 rules, horizontal 
 to K0 times the vertical one, level or not, and what that leaves out of balance is spread
 elastically. The stress lives on the points. As they move it goes with them, and what the ground in
 its new shape leaves out of balance acts on it in the next lapse, or, once a mechanism has slid, is
-spread again. Base and sides hold the ground here as they would for a long time: a compliant base is
-fixed, dashpots and free fields are rollers; what they bear is none of the imbalance.
+spread again. Stress that has fallen because the ground is softer is borne elastically again, and
+gives the ground a displacement. Base and sides hold the ground here as they would for a long time:
+a compliant base is fixed, dashpots and free fields are rollers; what they bear is none of the
+imbalance.
 """
 
 from __future__ import annotations
@@ -157,32 +159,80 @@ class Statics:
         Raises:
             BalanceError: More is left.
         """
-        domain, unknowns = self._domain, self.unknowns
-        lame, shear = elastic_constants(ground, self._scene.solver).at(domain.input_cells)
         R = self._resampling(points)
+        f_g = self.unknowns.collect(self.weight_of(points))
+        constants = elastic_constants(ground, self._scene.solver)
+        scale = f_g.norm()
+        _, left = self._bear(points, R, f_g, constants, scale)
+        f_g.destroy()
+        if left > limit * scale:
+            raise BalanceError(left / scale, limit)
+
+    def redistribute(
+        self, points: Points, fallen: RealArray, constants: ElasticConstants
+    ) -> RealArray:
+        """Let the ground bear elastically what stress bore before it fell (collective).
+
+        Args:
+            points: Points, their stress changed in place.
+            fallen: Their stress after the fall [Pa], shaped like the stress.
+            constants: Elastic constants of every cell that bear it.
+
+        Returns:
+            The displacement that it takes at this rank's nodes, ghosts included [m], shape
+            ``(num_local_nodes, num_components)``. What strain cannot bring to the points is left
+            out of balance.
+        """
+        R = self._resampling(points)
+        force = self.unknowns.collect(self._internal(points, R))
+        points["stress"] = fallen
+        lost = self._lacking(points, R, force)
+        u, _ = self._bear(points, R, force, constants, lost.norm())
+        for vector in (force, lost):
+            vector.destroy()
+        return u
+
+    def _lacking(self, points: Points, R: sparse.csr_matrix, force: PETSc.Vec) -> PETSc.Vec:
+        """What of a force the stress of points does not bear; the caller destroys it."""
+        residual = self.unknowns.collect(self._internal(points, R))
+        residual.aypx(-1.0, force)
+        return residual
+
+    def _bear(
+        self,
+        points: Points,
+        R: sparse.csr_matrix,
+        force: PETSc.Vec,
+        constants: ElasticConstants,
+        scale: float,
+    ) -> tuple[RealArray, float]:
+        """Strain the ground elastically until stress bears a force, to BALANCE of a scale.
+
+        Returns:
+            The displacement [m], and the norm of what is left [N, in 2D N/m].
+        """
+        domain, unknowns = self._domain, self.unknowns
+        lame, shear = constants.at(domain.input_cells)
+        rows = self._force.strain_rows(points)
+        x, left = force.duplicate(), np.inf
+        total = unknowns.expand(0.0 * x.array_r.real)
         with self._factorised(lame, shear) as factorisation:
-            rows = self._force.strain_rows(points)
-            f_g = unknowns.collect(self.weight_of(points))
-            scale, left = f_g.norm(), np.inf
-            x = f_g.duplicate()
             for _ in range(_STEPS):
-                residual = unknowns.collect(self._internal(points, R))
-                residual.aypx(-1.0, f_g)
+                residual = self._lacking(points, R, force)
                 factorisation.backsolve(residual, x)
                 if self._K_G is not None:
                     residual.axpy(-1.0, self._K_G @ x)
-                before, left = left, residual.norm() / scale
+                before, left = left, residual.norm()
                 residual.destroy()
-                if left <= BALANCE or left >= before:
+                if left <= BALANCE * scale or left >= before:
                     break
                 u = unknowns.expand(x.array_r.real)
+                total += u
                 strain = (rows @ u.ravel()).reshape(len(points), -1)
-                constants = lame[points.cell], shear[points.cell]
-                points["stress"] = points["stress"] + isotropic_stress(strain, *constants)
-            for vector in (f_g, x):
-                vector.destroy()
-        if left > limit:
-            raise BalanceError(left, limit)
+                added = isotropic_stress(strain, lame[points.cell], shear[points.cell])
+                points["stress"] = points["stress"] + added
+        x.destroy()
+        return total, left
 
     def _factorised(self, lame: RealArray, shear: RealArray) -> SymmetricFactorisation:
         T, cells = self.unknowns.T, self._domain.input_cells

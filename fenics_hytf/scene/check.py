@@ -23,7 +23,12 @@ from fenics_hytf.scene.boundary import (
     outcrop_rules,
     read_boundary,
 )
-from fenics_hytf.scene.continuity import continuity_rules, resolve, sliding_rules
+from fenics_hytf.scene.continuity import (
+    continuity_rules,
+    resolve,
+    sliding_rules,
+    softening_rules,
+)
 from fenics_hytf.scene.faults import (
     NOT_YET,
     Fault,
@@ -119,6 +124,7 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         faults += _calm_rules(raw, sections)
         faults += _degradation_rules(sections)
         faults += _sliding_rules(sections)
+        faults += _softening_rules(sections)
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
         faults += _settle_continuity(raw, sections)
@@ -257,6 +263,21 @@ def _sliding_rules(sections: Sections) -> Iterator[Fault]:
             yield Fault(key, "no strength", "cohesion [Pa] or friction_angle [degrees] for sliding")
 
 
+def _softening_rules(sections: Sections) -> Iterator[Fault]:
+    """Softening has stress to redistribute, moduli that fall, and no other law beside it."""
+    effects = sections.effects
+    if effects is None or not effects.softening:
+        return
+    if effects.gravity is None:
+        yield Fault("effects.gravity", "nothing", "gravity, whose stress softening redistributes")
+    if effects.equivalent_linear is None and effects.degradation is None:
+        expected = "equivalent_linear or degradation: without, no modulus falls for softening"
+        yield Fault("effects.equivalent_linear", "nothing", expected)
+    if effects.sliding is not None:
+        expected = "one of the two: together they count the same permanent displacement twice"
+        yield Fault("effects.softening", "true beside sliding", expected)
+
+
 def _num_lapses(sections: Sections) -> int | None:
     """Number of lapses, or ``None`` where it is not known or there is a fault."""
     lapses = sections.lapses
@@ -277,7 +298,7 @@ def _antiplane_rules(raw: dict[str, Any]) -> Iterator[Fault]:
     mesh, effects = raw.get("mesh"), raw.get("effects")
     if not (isinstance(mesh, dict) and mesh.get("kinematics") == "antiplane"):
         return
-    for name in ("convection", "geometric_stiffness", "gravity", "sliding", "locking"):
+    for name in ("convection", "geometric_stiffness", "gravity", "sliding", "softening", "locking"):
         if isinstance(effects, dict) and effects.get(name):
             expected = "nothing: antiplane motion leaves the points where they are in the section"
             yield Fault(f"effects.{name}", toml_text(effects[name]), expected)
@@ -322,6 +343,8 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
     if effects.sliding is not None:
         yield from sliding_rules(raw, lapses, solver)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
+    if handed_over and effects.softening and effects.convection:
+        yield from softening_rules(solver)
     if handed_over and solver.complex_modulus != "maxwell" and sections.boundary is not None:
         for name, kind in sections.boundary.kinds.items():
             if kind == "free_field":

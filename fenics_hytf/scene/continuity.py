@@ -84,6 +84,20 @@ def sliding_rules(raw: dict[str, Any], lapses: Lapses, solver: Solver) -> Iterat
         yield Fault("solver.complex_modulus", toml_text(solver.complex_modulus), expected)
 
 
+def softening_rules(solver: Solver) -> Iterator[Fault]:
+    """What softening needs of the law, where points move from one transient lapse to the next.
+
+    Args:
+        solver: ``[solver]``, resolved.
+
+    Yields:
+        The fault: under a law that is not causal static stress takes vibration along.
+    """
+    if solver.complex_modulus != "maxwell":
+        expected = '"maxwell": another law keeps no static stress of its own for softening'
+        yield Fault("solver.complex_modulus", toml_text(solver.complex_modulus), expected)
+
+
 def continuity_rules(
     raw: dict[str, Any],
     lapses: Lapses,

@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -196,6 +196,7 @@ class Effects(Table):
         calm: The absorbing layer, or ``None``.
         gravity: Weight and initial stress, or ``None``.
         sliding: Permanent displacement, or ``None``.
+        softening: Permanent displacement by the stiffness-reduction estimate.
         locking: Volumetric strain varies less within a cell than shear strain, at degree 1 not at
             all, against locking near ν = 0.5.
     """
@@ -208,11 +209,8 @@ class Effects(Table):
     calm: Calm | None = Field(None, description="a table with sides, thickness and damping")
     gravity: Gravity | None = Field(None, description="a table, true or false")
     sliding: Sliding | None = Field(None, description="a table, true or false")
+    softening: bool = Field(False, description="true or false")
     locking: bool = Field(False, description="true or false")
-
-    later: ClassVar[Mapping[str, str]] = {
-        "softening": "sliding is, which gives permanent displacement"
-    }
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:

@@ -11,13 +11,13 @@ import difflib
 import math
 import re
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from fenics_hytf.scene.faults import NOT_YET, Fault, join_key, name_key, toml_text
+from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
 
 NAME = re.compile(r"[^,\"\x00-\x1f\x7f]+")
 """Names of soils and regions, which are a column of a CSV file."""
@@ -39,12 +39,6 @@ class Table(BaseModel):
     """A table of the scene file: no unknown keys, no conversions, no NaN, no change afterwards."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-    later: ClassVar[Mapping[str, str]] = {}
-    """Known keys that are not in this version, with what is."""
-
-    later_values: ClassVar[Mapping[str, Mapping[str, str]]] = {}
-    """Known values, by key, that are not in this version, with what is."""
 
     @classmethod
     def rules(cls, raw: dict[str, Any], key: str) -> Iterator[Fault]:
@@ -70,17 +64,11 @@ def read_table(model: type[_T], raw: object, key: str) -> tuple[_T | None, list[
     """
     if not isinstance(raw, dict):
         return None, [Fault(key, toml_text(raw), "a table")]
-    faults = list(_not_in_this_version(model, raw, key))
-    known = {
-        name: value
-        for name, value in raw.items()
-        if name not in model.later and not _is_later(model, name, value)
-    }
-    faults += list(model.rules(known, key))
+    faults = list(model.rules(raw, key))
     ruled = {fault.key for fault in faults}
     table = None
     try:
-        table = model.model_validate(model.prepare(known))
+        table = model.model_validate(model.prepare(raw))
     except ValidationError as error:
         errors = error.errors(include_url=False)
         found = [_translate(model, e, key) for e in errors if not _follows(e, errors)]
@@ -136,21 +124,6 @@ def unknown_key(key: str, value: object, name: str, known: list[str]) -> Fault:
     return Fault(key, toml_text(value), f"one of the keys {', '.join(known)}{hint}")
 
 
-def _is_later(model: type[Table], name: str, value: object) -> bool:
-    return isinstance(value, str) and value in model.later_values.get(name, {})
-
-
-def _not_in_this_version(model: type[Table], raw: dict[str, Any], key: str) -> Iterator[Fault]:
-    for name, value in raw.items():
-        if name in model.later and value is not False:
-            text = model.later[name]
-        elif _is_later(model, name, value):
-            text = model.later_values[name][value]
-        else:
-            continue
-        yield Fault(join_key(key, name), toml_text(value), f"{NOT_YET}; {text}")
-
-
 def _follows(error: ErrorDetails, errors: list[ErrorDetails]) -> bool:
     """Whether a complaint about a whole only follows from one about its parts."""
     loc = error["loc"]
@@ -162,8 +135,8 @@ def _translate(model: type[Table], error: ErrorDetails, key: str) -> Fault:
     where = join_key(key, *(p if isinstance(p, int) else name_key(p) for p in error["loc"]))
     table, field = _field_at(model, error["loc"])
     if error["type"] in ("extra_forbidden", "invalid_key"):
-        known = [*table.model_fields, *table.later]
-        return unknown_key(where, error["input"], str(error["loc"][-1]), known)
+        name = str(error["loc"][-1])
+        return unknown_key(where, error["input"], name, list(table.model_fields))
     found = toml_text(None if error["type"] == "missing" else error["input"])
     expected = field.description if field is not None and field.description else "a table"
     return Fault(where, found, expected)

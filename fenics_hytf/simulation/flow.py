@@ -66,6 +66,7 @@ def simulate(
             run.observe(solved, index, segment.start)
             run.count_cycles(solved)
             run.hand_over(solved)
+            run.soften(solved)
             run.convect(solved)
             if snapshot is not None and (index + 1) % scene.output.every == 0:
                 run.show(solved, index, snapshot)

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.particles import Points, Sites, locate, resolve_owners
+from fenics_hytf.particles import Points, Sites, locate, resolve_owners, transfer_matrix
 from fenics_hytf.scene import Fault, Receiver
 
 RealArray = npt.NDArray[np.float64]
@@ -115,3 +115,19 @@ class Receivers:
             np.concatenate([cells, points.cell[carried]]), np.concatenate([X, points.X[carried]])
         )
         return sites, np.concatenate([numbers, riders])
+
+    def at(self, points: Points, nodal: RealArray) -> RealArray:
+        """A nodal field at the receivers as they are now (collective).
+
+        Args:
+            points: The points, for those that ride them.
+            nodal: At this rank's nodes, ghosts included, shape
+                ``(num_local_nodes, num_components)``.
+
+        Returns:
+            Shape ``(num_receivers, num_components)``; nought where a point has left the mesh.
+        """
+        sites, numbers = self.sites(points)
+        mine = np.zeros((len(self.names), nodal.shape[1]))
+        mine[numbers] = transfer_matrix(sites, self._domain.V) @ nodal
+        return np.asarray(self._domain.comm.allreduce(mine))

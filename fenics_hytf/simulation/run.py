@@ -27,8 +27,10 @@ from fenics_hytf.lapse import (
     Observer,
     Sliding,
     SlipState,
+    Softening,
     Solved,
     Statics,
+    cell_stress,
     choose_continuity,
     convect,
     first_strain,
@@ -106,6 +108,8 @@ class Run:
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
         self._sliding: Sliding | None = None
+        self._softening: Softening | None = None
+        self._given_way: RealArray | float = 0.0
         self._start_field: RealArray | float = 0.0
         self._owned: list[Equations | Continuity | Observation | Statics | Sliding | FreeField] = []
 
@@ -132,6 +136,9 @@ class Run:
                     scene, self.domain, self.equations, self.continuity, statics
                 )
                 self._owned.append(self._sliding)
+            if scene.effects.softening:
+                assert statics is not None
+                self._softening = Softening(self.domain, statics)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
             self.observation = Observation(
                 scene, self.domain, self.equations, self.continuity, self.points
@@ -292,6 +299,24 @@ class Run:
         momentum.destroy()
         return field
 
+    def soften(self, solved: Solved) -> None:
+        """Static stress falls where G is lower than ever before, and the ground gives way."""
+        if self._softening is None:
+            return
+        assert self._ground is not None
+        with self.clock.phase("convection"):
+            increment = self._softening(self.points, self._ground, solved.moduli)
+            before = self.lapses[-2].softening if len(self.lapses) > 1 else None
+            moved = 0.0 * self.observation.carried if before is None else before.displacement
+            if increment is not None:
+                self._work.factorisations += 1
+                moved = moved + self.observation.receivers.at(self.points, increment)
+                if self.scene.effects.geometric_stiffness and not self.scene.effects.convection:
+                    self.equations.stiffen(cell_stress(self.domain, self.points))
+            softening = self._softening.result(self.points, moved)
+        self._given_way = 0.0 if increment is None else increment
+        self.lapses[-1] = replace(self.lapses[-1], softening=softening)
+
     def convect(self, solved: Solved) -> None:
         """Points take u(t_end) − u(t_start), move, and are found again by (7)-(9)."""
         if not self.scene.effects.convection:
@@ -302,9 +327,10 @@ class Run:
             report = convect(
                 self.domain,
                 self.points,
-                u - self._nodal_motion(solved, 0.0),
+                u - self._nodal_motion(solved, 0.0) + self._given_way,
                 self.scene.points.outside,
-                solved.material.real,
+                # Softening has strained the static stress itself, and vibration does not.
+                solved.material.real if self._softening is None else None,
                 v if slip is None else v + slip.at_end(1),
                 a if slip is None else a + slip.at_end(2),
                 self._density,

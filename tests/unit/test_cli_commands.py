@@ -138,7 +138,7 @@ def test_every_fault_is_told_at_once_and_nothing_written(here, hytf):
         (("s.toml", "--set", "nonsense"), "nonsense"),
         (("s.toml", "--group-size", "2"), "group size: found 2, with 1 rank; expected one of 1"),
         (("s.toml", "--group-size", "0"), "group size: found 0"),
-        (("s.toml", "--set", "effects.softening=true"), "not in this version"),
+        (("s.toml", "--set", "effects.softening=true"), "gravity"),
         (("s.toml", "--set", 'lapses.continuity="cyclic"'), '"steady" or "transient"'),
         (("s.toml", "--bogus"), "bogus"),
         ((), "SCENE"),

@@ -223,6 +223,24 @@ def test_free_field_hands_over_under_a_causal_law_only(lapses, law, bad):
 
 
 @pytest.mark.parametrize(
+    ("lapses", "law", "moves", "bad"),
+    [
+        (SEVERAL, None, True, False),
+        (SEVERAL, "hysteretic", True, True),
+        (SEVERAL, "hysteretic", False, False),
+        (SEVERAL | {"continuity": "steady"}, "hysteretic", True, False),
+        ({"continuity": "transient"}, "hysteretic", True, False),
+    ],
+)
+def test_softening_and_vibration_keep_their_stress_apart(lapses, law, moves, bad):
+    soil = {"sand": SAND | {"curves": {"model": "seed_idriss_1970_mean"}}}
+    effects = {"gravity": True, "softening": True, "equivalent_linear": True, "convection": moves}
+    solver = {"complex_modulus": law} if law else {}
+    got = faults(lapses=lapses, solver=solver, soil=soil, effects=effects)
+    assert [fault.key for fault in got] == ["solver.complex_modulus"] * bad
+
+
+@pytest.mark.parametrize(
     ("lapses", "key"), [({"count": 25}, "count"), ({"duration": 0.3}, "duration")]
 )
 def test_transient_lapses_have_twenty_samples(lapses, key):

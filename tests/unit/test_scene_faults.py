@@ -249,12 +249,28 @@ def test_sliding_is_transient_under_a_causal_law():
     assert settled.solver.complex_modulus == "maxwell"
 
 
-@pytest.mark.parametrize("value", [True, {"a": 1}])
-def test_what_a_later_version_brings_is_said(value):
-    got = faults(changed(effects__softening=value))
-    assert [fault.key for fault in got] == ["effects.softening"]
-    assert got[0].expected.startswith("not in this version; ")
-    assert "; not in this version; " in str(got[0])
+SOFTENS = {"effects__softening": True, "effects__gravity": True}
+
+
+def test_softening_has_weight_and_moduli_that_fall():
+    got = faults(changed(effects__softening=True, effects__equivalent_linear=...))
+    assert [fault.key for fault in got] == ["effects.gravity", "effects.equivalent_linear"]
+    assert faults(changed(**SOFTENS)) == []
+    degrades = SOFTENS | {"effects__equivalent_linear": ..., "effects__degradation": True}
+    assert faults(changed(**degrades)) == []
+    assert not Scene.from_dict(changed(effects__softening=False)).effects.softening
+
+
+def test_softening_and_sliding_are_not_counted_both():
+    strong = {f"soil__{name}__friction_angle": 30.0 for name in ("sand", "fill")}
+    (fault,) = faults(changed(**SOFTENS, **strong, effects__sliding=True))
+    assert (fault.key, fault.found) == ("effects.softening", "true beside sliding")
+    assert "twice" in fault.expected
+
+
+def test_softening_is_true_or_false():
+    (fault,) = faults(changed(effects__softening={"a": 1}))
+    assert (fault.key, fault.expected) == ("effects.softening", "true or false")
 
 
 def box(**values):

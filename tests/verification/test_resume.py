@@ -108,6 +108,8 @@ ROCK = "{ density = 2200.0, shear_wave_velocity = 700.0, poisson = 0.3, damping 
         {"effects__convection": "false"},
         {"effects__equivalent_linear": "false", "effects__geometric_stiffness": "false"},
         {"effects__degradation": "{ threshold = 1e-6 }"},
+        {"effects__softening": "true", "effects__gravity": "true"},
+        {"effects__softening": "true", "effects__gravity": "true", "effects__convection": "false"},
         {
             "boundary__left": '"free_field"',
             "boundary__right": '"free_field"',

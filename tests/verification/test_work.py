@@ -1,5 +1,7 @@
 """Only what a scene calls for is assembled and solved: the counts of the work show it."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
@@ -77,6 +79,27 @@ def test_points_carry_only_what_an_effect_needs():
         simulate(scene(effects={"convection": True, "geometric_stiffness": True}))
     assert set(seen[0].history) == set()
     assert set(seen[1].history) == {"velocity", "acceleration", "strain", "stress"}
+
+
+def test_softening_costs_a_factorisation_a_new_minimum_and_nothing_where_it_is_off():
+    soil = {"density": 1800.0, "shear_wave_velocity": 200.0, "poisson": 0.3}
+    curves = {"strain": [1e-6, 1e-2], "modulus": [1.0, 0.1], "damping": [0.01, 0.2]}
+
+    def run(**softening):
+        effects = {"equivalent_linear": True, "gravity": True} | softening
+        soils = {"sand": soil | {"curves": curves}}
+        shown = []
+        result = simulate(scene(soil=soils, effects=effects), snapshot=shown.append)
+        return result, {**asdict(result.work), "wall_s": None}, set(shown[-1].points)
+
+    never, work, names = run()
+    off, work_off, names_off = run(softening=False)
+    assert (work, names) == (work_off, names_off)
+    assert never.lapses[0].softening is off.lapses[0].softening is None
+    on, work_on, names_on = run(softening=True)
+    assert names_on - names == {"softest", "permanent_displacement"}
+    assert work_on == work | {"factorisations": work["factorisations"] + 1}
+    assert on.lapses[0].softening.softest.max() < 1
 
 
 def test_zero_motion_moves_nothing():
