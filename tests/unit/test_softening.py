@@ -10,8 +10,9 @@ from mpi4py import MPI
 from support.meshes import SOIL, scene
 
 from fenics_hytf.domain import build
-from fenics_hytf.lapse import Moduli, Softening, Statics, seed_points, survey
+from fenics_hytf.lapse import FillingSurvey, Moduli, Softening, Statics, seed_points, survey
 from fenics_hytf.lapse.softening import fallen_stress
+from fenics_hytf.particles import move
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 ROUND_OFF = 1e-10
@@ -168,3 +169,68 @@ def test_nothing_moves_without_a_new_minimum():
     softening = Softening(domain, None)  # asked for nothing
     assert softening(points, ground, Moduli(least * ground.shear_modulus, ground.damping)) is None
     assert np.array_equal(points["stress"], stress)
+
+
+SLOPE = [
+    {"soil": "clay", "polygon": [[0, 0], [24, 0], [24, 4], [16, 4], [8, 12], [0, 12]]},
+    {"soil": "air"},
+]
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("count", [4, 9])
+def test_points_that_have_moved_are_softened_where_they_are(count, figure):
+    """Ground flows downslope and fills cells in part; its points bring their own least moduli.
+
+    What the fall takes is borne again, and what was out of balance before it is so after it.
+    """
+    case = scene(
+        {
+            "box": {"size": [24.0, 16.0], "cells": [24, 16]},
+            "regions": SLOPE,
+            "empty": ["air"],
+            "points_per_cell": count,
+        },
+        soil={"clay": SOIL},
+        boundary={"left": "roller", "right": "roller"},
+        lapses={"count": 2},
+        effects={
+            "gravity": {"initial_stress": "elastic"},
+            "degradation": True,
+            "softening": True,
+            "convection": True,
+        },
+    )
+    domain = build(case, WORLD)
+    points = seed_points(case, domain)
+    statics, look = Statics(case, domain), FillingSurvey(case, domain)
+
+    def weighed():
+        filling = look(points)
+        statics.occupy(filling, True)
+        return survey(case, domain, points, filling)
+
+    def off() -> np.ndarray:
+        left = statics.unknowns.collect(statics.imbalance(points))
+        return left.array_r.real.copy()
+
+    ground = weighed()
+    statics.settle(points, ground)
+    softening = Softening(domain, statics)
+    ratio = np.linspace(0.9, 0.4, domain.num_cells)
+    softening(points, ground, Moduli(ratio * ground.shear_modulus, ground.damping))
+    assert points["softest"].min(initial=1.0) < 1.0
+    carried = dict(zip(points.id.tolist(), points["softest"].tolist(), strict=True))
+
+    move(domain.mesh, points, 0.4 * np.sin(points.x / 5) * points.x[:, 1:] / 12)
+    everyone = {k: v for part in WORLD.allgather(carried) for k, v in part.items()}
+    assert all(everyone[i] == r for i, r in zip(points.id, points["softest"], strict=True))
+    ground, before = weighed(), off()
+    softest = points["softest"].copy()
+    ratio = np.where(np.arange(domain.num_cells) % 3, 1.0, 0.3)
+    softening(points, ground, Moduli(ratio * ground.shear_modulus, ground.damping))
+    fell = ratio[domain.input_cells[points.cell]] < softest
+    np.testing.assert_array_equal(points["softest"], np.where(fell, 0.3, softest))
+    weight = statics.unknowns.collect(statics.weight_of(points)).norm()
+    change = np.sqrt(WORLD.allreduce(float(np.sum((off() - before) ** 2)))) / weight
+    figure(f"softening of a moved slope, {count} points, {WORLD.size} ranks", change, 1e-8)

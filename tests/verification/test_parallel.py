@@ -70,6 +70,9 @@ def worst_difference(mine, alone) -> float:
         worst = max(worst, float(abs(lapse.cells.change - reference.cells.change).max()))
         # The worst cell itself may be either of two that mirror each other.
         compare(lapse.loop.change, reference.loop.change)
+        if reference.softening is not None:
+            for field in fields(reference.softening):
+                compare(*(getattr(r.softening, field.name) for r in (lapse, reference)))
         ledger, other = lapse.ledger.as_dict(), reference.ledger.as_dict()
         del ledger["migrated"], other["migrated"]
         assert ledger == other  # sums of masses are exact
@@ -241,6 +244,28 @@ def test_lapses_with_convection(continuity, law, figure):
     )
     result = agree(case, figure, f"four lapses, {continuity}, {law}")
     assert len(result.lapses) == 4
+
+
+def test_a_slope_that_softens(figure):
+    """Points migrate with the least modulus that their ground has had."""
+    air = [[0, 6], [4, 6], [10, 2], [12, 2], [12, 7], [0, 7]]
+    case = scene(
+        {
+            "box": {"size": [12.0, 7.0], "cells": [12, 7]},
+            "regions": [{"soil": "air", "polygon": air}, {"soil": "soft"}],
+            "empty": ["air"],
+        },
+        soil={"soft": SOFT | {"curves": CURVES}},
+        motion=[record("x", 0.1)],
+        boundary={"left": "roller", "right": "roller"},
+        lapses={"count": 3},
+        effects=dict.fromkeys(
+            ("equivalent_linear", "gravity", "geometric_stiffness", "convection", "softening"), True
+        ),
+        output={"receivers": {"crest": [3.0, 6.0], "rider": {"point": [5.0, 4.0]}}},
+    )
+    result = agree(case, figure, "a slope that softens")
+    assert result.lapses[-1].softening.largest > result.lapses[0].softening.largest > 1e-5
 
 
 ROCK = {"density": 2300.0, "shear_wave_velocity": 700.0, "poisson": 0.25, "damping": 0.01}
