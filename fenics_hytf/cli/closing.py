@@ -39,6 +39,7 @@ def closing_words(summary: Mapping[str, Any], folder: Path, plots: bool) -> str:
         last = "" if change is None else f", last change {change:.1e}"
         rows.append(("iterations", f"{sum(iterations)}{last}"))
     rows += _slip(summary)
+    rows += _softening(summary)
     rows += _seams(summary)
     rows += _base(summary)
     rows += _peaks(summary)
@@ -60,6 +61,18 @@ def _slip(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
         f"{told['rigid_m']:.3g}), "
     )
     return [("sliding", words + ("still moving" if rest is None else f"at rest at {rest:.3g} s"))]
+
+
+def _softening(summary: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """How far softened ground has given way."""
+    told = summary["softening"]
+    if told is None:
+        return []
+    words = (
+        f"permanent displacement up to {told['largest_m']:.3g} m, G/Gmax down to "
+        f"{told['softest']:.3g} (stiffness-reduction estimate)"
+    )
+    return [("softening", words)]
 
 
 def _seams(summary: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -65,6 +65,7 @@ def describe_scene(scene: Scene, region_names: tuple[str, ...]) -> dict[str, Any
         "degradation": None if effects.degradation is None else effects.degradation.model_dump(),
         "gravity": None if effects.gravity is None else effects.gravity.model_dump(),
         "sliding": None if effects.sliding is None else effects.sliding.model_dump(),
+        "softening": effects.softening,
         "calm": None if effects.calm is None else effects.calm.model_dump(),
         "water_table_m": scene.output.water_table,
         "solver": solver.model_dump(),

@@ -22,6 +22,7 @@ from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.energy import ledger, totals, worst_seam_error
 from fenics_hytf.results.layers import layer_states
 from fenics_hytf.results.sliding import slide, slip_record, slip_warnings
+from fenics_hytf.results.softening import softening_record
 from fenics_hytf.results.writers import QUANTITIES, base_motions
 from fenics_hytf.soil import HELD_DAMPING, LimitedCurve
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from fenics_hytf.lapse import LapseResult
     from fenics_hytf.simulation import Result
 
-FORMAT = 4
+FORMAT = 5
 """Raised when a key of the summary changes its meaning, or one that is read is new."""
 
 _SEAM_ERROR = 0.01  # of the peaks; seams of sound lapses are some 1e-4 off
@@ -82,6 +83,7 @@ def summarise(result: Result) -> dict[str, Any]:
         "worst_seam_error": worst_seam_error(result.lapses),
         "energy": totals(result.lapses, _gdim(result)),
         "sliding": slide(result),
+        "softening": softening_record(result.lapses[-1], result.receivers),
         "peaks": _peaks(result),
         "intensity": _intensity(result),
         "work": work,
@@ -352,6 +354,7 @@ def _lapse(result: Result, lapse: LapseResult) -> dict[str, Any]:
         "energy": ledger(lapse.energy, _gdim(result)),
         "degradation": None if degradation is None else np.nanmin(degradation),
         "slip": slip_record(result.scene, lapse),
+        "softening": softening_record(lapse, result.receivers),
         "points_lost": lapse.ledger.deleted,
         "points_parked": lapse.ledger.parked,
         "mass_ledger": lapse.ledger.as_dict(),

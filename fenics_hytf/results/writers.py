@@ -182,8 +182,9 @@ CELL_VALUES = (
 )
 """Columns of ``cells.csv`` after the place: of a cell's state, and what the overburden adds.
 
-``degradation`` follows where cycles degrade soils, ``fill`` where cells may be empty, and
-``mechanism_strain``, the shear strain of a metre of slip [1/m], where soil slides.
+``degradation`` follows where cycles degrade soils, ``fill`` where cells may be empty,
+``mechanism_strain``, the shear strain of a metre of slip [1/m], where soil slides, and ``softest``,
+the least G over its small-strain value up to the end of the lapse, where it softens for good.
 """
 
 
@@ -198,6 +199,8 @@ def _cells(result: Result) -> tuple[list[str], Rows]:
     columns += tuple(n for n in ("degradation", "fill") if getattr(first.cells, n) is not None)
     if first.slip is not None:
         columns += ("mechanism_strain",)
+    if first.softening is not None:
+        columns += ("softest",)
 
     def block(lapse: LapseResult) -> Rows:
         cells = lapse.cells
@@ -207,6 +210,8 @@ def _cells(result: Result) -> tuple[list[str], Rows]:
         values = vars(cells) | {"vertical_stress": overburden, "stress_ratio": ratio}
         if lapse.slip is not None:
             values["mechanism_strain"] = lapse.slip.shear_strain
+        if lapse.softening is not None:
+            values["softest"] = lapse.softening.softest
         return _rows(
             [
                 np.full(len(filled), lapse.index),

@@ -215,12 +215,15 @@ def _notes(
         yield from _damping_notes(scene, soils)
     if effects.sliding is not None:
         yield "what slides may cut lapses short, and go on after the motion until it rests"
-    elif effects.convection and len(lines) == 1:
+    elif effects.convection and len(lines) == 1 and not effects.softening:
         yield "convection acts between lapses; the scene has one"
     if effects.convection and steady:
-        yield "under steady continuity the net movement of the points in a lapse is zero"
+        but = ", but for softening" if effects.softening else ""
+        yield f"under steady continuity the net movement of the points in a lapse is zero{but}"
     if effects.degradation is not None:
         yield "degradation acts between lapses: cycles of one lower the modulus from the next on"
+    if effects.softening:
+        yield "softening is an estimate from reduced stiffness: it knows neither strength nor time"
     if effects.geometric_stiffness and effects.gravity is None:
         yield "the points start without stress: geometric_stiffness adds nothing yet"
 

@@ -108,6 +108,8 @@ def _cell_fields(lapse: LapseResult) -> dict[str, npt.NDArray[np.float64]]:
     fields = {name: getattr(state, name) for name in names if getattr(state, name) is not None}
     if lapse.slip is not None:
         fields["mechanism_strain"] = lapse.slip.shear_strain
+    if lapse.softening is not None:
+        fields["softest"] = lapse.softening.softest
     return fields
 
 

@@ -146,6 +146,10 @@ def test_defaults_of_one_lapse_and_of_harmonics():
         ({"effects": {"degradation": True}}, ["degradation acts between lapses"]),
         ({"effects": {"convection": True}}, []),
         (
+            {"effects": {"degradation": True, "gravity": True, "softening": True}},
+            ["degradation acts between lapses", "softening is an estimate from reduced stiffness"],
+        ),
+        (
             {"effects": {"convection": True}, "lapses": {"continuity": "steady"}},
             ["under steady continuity the net movement"],
         ),

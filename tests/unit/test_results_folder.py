@@ -168,9 +168,9 @@ def test_unreadable_results_are_refused(tmp_path):
         (tmp_path / "r/summary.json").write_text(broken)
         with pytest.raises(ResultError, match="cannot be read"):
             read_result(tmp_path / "r")
-    old = json.dumps({**json.loads(text), "format": 3})
+    old = json.dumps({**json.loads(text), "format": 4})
     (tmp_path / "r/summary.json").write_text(old)
-    with pytest.raises(ResultError, match=r"of format 3, this version reads 4.*Run the scene"):
+    with pytest.raises(ResultError, match=r"of format 4, this version reads 5.*Run the scene"):
         publish(tmp_path / "r")
     (tmp_path / "r/summary.json").write_text(text)
     (tmp_path / "r/cells.csv").write_text("lapse,cell\n1\n")

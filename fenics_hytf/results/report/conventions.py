@@ -52,7 +52,7 @@ def method(summary: Summary) -> list[str]:
     Returns:
         Paragraphs of plain text.
     """
-    parts = (_analysis, _soil, _modulus, _sliding, _base, _sides, _lines, _quantities)
+    parts = (_analysis, _soil, _modulus, _sliding, _softening, _base, _sides, _lines, _quantities)
     return [text for part in parts if (text := " ".join(part(summary)))]
 
 
@@ -207,6 +207,21 @@ def _sliding(summary: Summary) -> Iterator[str]:
         "upslope are not in the method, nor is pore pressure. PGD, which takes the motion as one "
         "that repeats itself, says nothing about ground that slides: its displacement is in the "
         "table of peaks."
+    )
+
+
+def _softening(summary: Summary) -> Iterator[str]:
+    if not summary["scene"]["softening"]:
+        return
+    yield (
+        "Permanent displacement is estimated from the reduction of stiffness (Lee, 1974; Serff et "
+        "al., 1976): where a lapse ends with a lower modulus than any before it, the deviator of "
+        "the static stress falls with the modulus, and the softened ground bears elastically what "
+        "is lacking, its bulk modulus that of small strain. In an infinite slope that is the shear "
+        "strain τ₀(1/G_min − 1/G₀), however many lapses it took. Shaking that brings no lower "
+        "modulus adds nothing, whatever it would do to a slope that slides: strength and the "
+        "length of shaking are not in the estimate. Nothing of it acts on the vibration"
+        + (", but that points move." if "convection" in summary["effects"] else ".")
     )
 
 

@@ -27,6 +27,7 @@ from fenics_hytf.results.report.input import input_section
 from fenics_hytf.results.report.markup import number, paragraphs, section, text
 from fenics_hytf.results.report.seams import seams_section
 from fenics_hytf.results.report.sliding import sliding_section
+from fenics_hytf.results.report.softening import softening_section
 from fenics_hytf.results.report.style import STYLE
 from fenics_hytf.results.report.work import work_section
 from fenics_hytf.results.summary import component_peaks
@@ -74,6 +75,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
             figures["motion"],
         ),
         sliding_section(stored, figures["sliding"]),
+        softening_section(summary),
         section("Strain, stress and stiffness", figures["ground"]),
         seams_section(summary, figures["seams"]),
         _convergence(stored, figures["loop"]),
@@ -117,6 +119,9 @@ def _key_figures(summary: Summary) -> str:
     if sliding is not None:
         figures.append(("slip", f"{number(sliding['slip_m'])} m"))
         figures.append(("factor of safety at rest", number(sliding["factor_of_safety"])))
+    if summary["softening"] is not None:
+        moved = f"{number(summary['softening']['largest_m'])} m"
+        figures.append(("largest permanent displacement, estimated", moved))
     layers = [layer for lapse in summary["lapses"] for layer in lapse["layers"]]
     strain = max((i["effective_strain"][1] or 0.0 for i in layers), default=0.0)
     stiffness = min((i["g_over_gmax"][0] or 1.0 for i in layers), default=1.0)
