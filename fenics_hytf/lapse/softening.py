@@ -16,10 +16,10 @@ earthquake, that brings no new minimum moves nothing: a stress that fell with ev
 would ratchet.
 
 It is an estimate and no law of displacement. Strength is not in it, nor how long shaking lasts, nor
-which way it drives: three earthquakes move the ground no more than the strongest one, and against
-Newmark's sliding block it gave 0.25 to 640 times the slip. It is for ground that deforms
+which way it drives: three earthquakes move the ground no more than the strongest one, and in
+prototypes it gave 0.25 to 640 times the slip of Newmark's block. It is for ground that deforms
 throughout, such as embankments that settle; what slides is the business of
-:mod:`fenics_hytf.lapse.sliding`. Nothing of it acts on the vibration.
+:mod:`fenics_hytf.lapse.sliding`. Nothing of it acts on the vibration, but that points move.
 """
 
 from __future__ import annotations
@@ -123,8 +123,8 @@ def fallen_stress(
     normal = NORMAL_STRAINS[stress.shape[1]]
     bulk = 2 * (1 + poisson) / (3 * (1 - 2 * poisson))
     # λ + 2G/d over the small-strain modulus; in space the bulk modulus itself.
-    kept, keeps = (bulk + 2 * ratio * (1 / normal - 1 / 3) for ratio in (before, now))
+    stiff, stiff_now = (bulk + 2 * ratio * (1 / normal - 1 / 3) for ratio in (before, now))
     fallen = (now / before)[:, None] * stress
     mean = stress[:, :normal].mean(axis=1)
-    fallen[:, :normal] += ((keeps / kept - now / before) * mean)[:, None]
+    fallen[:, :normal] += ((stiff_now / stiff - now / before) * mean)[:, None]
     return fallen

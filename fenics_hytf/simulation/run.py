@@ -307,7 +307,8 @@ class Run:
         with self.clock.phase("convection"):
             increment = self._softening(self.points, self._ground, solved.moduli)
             before = self.lapses[-2].softening if len(self.lapses) > 1 else None
-            moved = 0.0 * self.observation.carried if before is None else before.displacement
+            shape = len(self.scene.output.receivers), self.domain.num_components
+            moved: RealArray = np.zeros(shape) if before is None else before.displacement
             if increment is not None:
                 self._work.factorisations += 1
                 moved = moved + self.observation.receivers.at(self.points, increment)
