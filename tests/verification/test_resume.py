@@ -137,11 +137,20 @@ def test_whatever_a_scene_calls_for(tmp_path, settings):
     assert before == after
 
 
+SOFTENS = {
+    "effects__softening": "true",
+    "effects__gravity": "true",
+    "effects__degradation": "{ threshold = 1e-6 }",
+}
+
+
 @pytest.mark.mpi
-def test_on_another_number_of_ranks_to_round_off(tmp_path, shared_path):
+@pytest.mark.parametrize("settings", [{}, SOFTENS], ids=["as it is", "softening"])
+def test_on_another_number_of_ranks_to_round_off(settings, tmp_path, shared_path):
     """From one rank to all, and from all to one; with one factorisation a line."""
     loop = "false" if WORLD.size > 1 else "true"
-    scene = scene_with(tmp_path, solver__sweep='"direct"', effects__equivalent_linear=loop)
+    given = settings | {"solver__sweep": '"direct"', "effects__equivalent_linear": loop}
+    scene = scene_with(tmp_path, **given)
     own = tmp_path / "own"
     whole = run(scene, SELF, own / "a")
     with pytest.raises(Stop):
