@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from fenics_hytf.scene.continuity import (
     sliding_rules,
     softening_rules,
 )
+from fenics_hytf.scene.effects import effect_rules
 from fenics_hytf.scene.faults import (
     NOT_YET,
     Fault,
@@ -120,11 +120,7 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         faults += _unknown_sections(raw)
         faults += _soil_rules(raw, sections)
         faults += _base_rules(raw, sections)
-        faults += _antiplane_rules(raw)
-        faults += _calm_rules(raw, sections)
-        faults += _degradation_rules(sections)
-        faults += _sliding_rules(sections)
-        faults += _softening_rules(sections)
+        faults += effect_rules(raw, sections.effects, sections.soil, _num_lapses(sections))
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
         faults += _settle_continuity(raw, sections)
@@ -218,66 +214,6 @@ def _base_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
         yield from input_rules(sections.motion, base)
 
 
-def _calm_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
-    """An absorbing layer lies along sides that there are."""
-    drawn = layout(raw.get("mesh"))
-    calm = sections.effects.calm if sections.effects is not None else None
-    if calm is None:
-        return
-    names = drawn.boundaries if drawn is not None else None
-    for i, side in enumerate(calm.sides):
-        where = join_key("effects.calm.sides", i)
-        # Of a mesh file the names are known later.
-        if side in ("base", "top") or (names is not None and side not in names):
-            sides = [name for name in names or () if name not in ("base", "top")]
-            yield Fault(where, toml_text(side), ", ".join(sides) or "a side")
-
-
-def _degradation_rules(sections: Sections) -> Iterator[Fault]:
-    """Degradation of soils that there are, between lapses, by the package that counts cycles."""
-    effect = sections.effects.degradation if sections.effects is not None else None
-    if effect is None:
-        return
-    key, soils = "effects.degradation", sections.soil
-    if find_spec("rainflow") is None:
-        expected = "it to be installed, as cycles are counted with it; run 'pip install rainflow'"
-        yield Fault(key, "no package rainflow", expected)
-    if _num_lapses(sections) == 1:
-        yield Fault(key, "one lapse", "more than one lapse: degradation acts between lapses")
-    for i, name in enumerate(effect.soils or ()):
-        if soils and name not in soils:
-            expected = f"one of the soils {', '.join(map(name_key, soils))}"
-            yield Fault(join_key(key, "soils", i), toml_text(name), expected)
-
-
-def _sliding_rules(sections: Sections) -> Iterator[Fault]:
-    """Sliding has weight to drive it, and strength to hold against it."""
-    effects = sections.effects
-    if effects is None or effects.sliding is None:
-        return
-    if effects.gravity is None:
-        yield Fault("effects.gravity", "nothing", "gravity, which drives what slides")
-    for name, soil in sections.soil.items():
-        if soil is not None and not soil.has_strength:
-            key = join_key("soil", name_key(name), "cohesion")
-            yield Fault(key, "no strength", "cohesion [Pa] or friction_angle [degrees] for sliding")
-
-
-def _softening_rules(sections: Sections) -> Iterator[Fault]:
-    """Softening has stress to redistribute, moduli that fall, and no other law beside it."""
-    effects = sections.effects
-    if effects is None or not effects.softening:
-        return
-    if effects.gravity is None:
-        yield Fault("effects.gravity", "nothing", "gravity, whose stress softening redistributes")
-    if effects.equivalent_linear is None and effects.degradation is None:
-        expected = "equivalent_linear or degradation: without, no modulus falls for softening"
-        yield Fault("effects.equivalent_linear", "nothing", expected)
-    if effects.sliding is not None:
-        expected = "one of the two: together they count the same permanent displacement twice"
-        yield Fault("effects.softening", "true beside sliding", expected)
-
-
 def _num_lapses(sections: Sections) -> int | None:
     """Number of lapses, or ``None`` where it is not known or there is a fault."""
     lapses = sections.lapses
@@ -291,17 +227,6 @@ def _num_lapses(sections: Sections) -> int | None:
         return len(split(longest, records[0].dt, duration=lapses.duration))
     except (ValueError, OverflowError):  # a fault of its own
         return None
-
-
-def _antiplane_rules(raw: dict[str, Any]) -> Iterator[Fault]:
-    """A section that moves across its plane stays in it."""
-    mesh, effects = raw.get("mesh"), raw.get("effects")
-    if not (isinstance(mesh, dict) and mesh.get("kinematics") == "antiplane"):
-        return
-    for name in ("convection", "geometric_stiffness", "gravity", "sliding", "softening", "locking"):
-        if isinstance(effects, dict) and effects.get(name):
-            expected = "nothing: antiplane motion leaves the points where they are in the section"
-            yield Fault(f"effects.{name}", toml_text(effects[name]), expected)
 
 
 def _time_rules(raw: dict[str, Any], sections: Sections) -> Iterator[Fault]:
