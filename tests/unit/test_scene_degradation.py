@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Degradation in the scene: its keys, its defaults, and what they need beside them."""
 
-import sys
 import tomllib
 
 import pytest
 
 from fenics_hytf.scene import Scene, check
+from fenics_hytf.scene import effects as rules
 from fenics_hytf.soil import DegradationLaw
 
 SCENE = """
@@ -118,8 +118,7 @@ def test_a_motion_with_a_fault_has_no_other():
 
 
 def test_without_the_library(monkeypatch):
-    module = sys.modules["fenics_hytf.scene.check"]  # its name is also that of its function
-    monkeypatch.setattr(module, "find_spec", lambda name: None)
+    monkeypatch.setattr(rules, "find_spec", lambda name: None)
     [fault] = faults("true")
     assert fault.startswith("effects.degradation: found no package rainflow; expected it to be ")
     assert "pip install rainflow" in fault
