@@ -257,11 +257,17 @@ class _Sweeps:
             return self._sweep(self.equations.system, loads, 0, None, self._directions)
 
     def kernel(self, loads: AffineLoads, s: ComplexArray, tolerance: float) -> Sweep:
-        """Sweep them at other complex frequencies."""
+        """Sweep them at other complex frequencies; again and again for the same force."""
         with self._observer.phase("sweep"):
             across = self._equations.across
             sweep = reduced_sweep(
-                self.equations.system, loads, s, tolerance, block=self._block, across=across
+                self.equations.system,
+                loads,
+                s,
+                tolerance,
+                block=self._block,
+                across=across,
+                directions=self._directions,
             )
         self._directions = sweep.basis
         self.tally.factorisations += sweep.factorisations

@@ -37,6 +37,7 @@ from fenics_hytf.lapse.starts import product
 from fenics_hytf.motion import (
     ConvolutionQuadrature,
     SlipHistory,
+    from_few,
     march,
     rigid_slip,
 )
@@ -160,12 +161,18 @@ class LapseSlip:
 
     def _kernel(self, kernel: Kernel, s: ComplexArray) -> ComplexArray:
         """P at complex frequencies."""
-        sweep = kernel(self._loads(s**2, s), s, _KERNEL)
         rows = _functionals(self._M_phi, self._C_phi)
-        seen = self._phi.comm.tompi4py().allreduce(sweep.project(rows)[:, 0])
+
+        def at(lines: npt.NDArray[np.intp]) -> ComplexArray:
+            some = s[lines]
+            sweep = kernel(self._loads(some**2, some), some, _KERNEL)
+            seen = self._phi.comm.tompi4py().allreduce(sweep.project(rows)[:, 0])
+            own = some**2 * self._modal_mass + some * self._modal_damping
+            return np.asarray((own - some**2 * seen[0] - some * seen[1]) / some**2)
+
+        found = from_few(at, s)
         rows.destroy()
-        own = s**2 * self._modal_mass + s * self._modal_damping
-        return np.asarray((own - s**2 * seen[0] - s * seen[1]) / s**2)
+        return found
 
     def _loads(self, mass: ComplexArray, damping: ComplexArray) -> AffineLoads:
         """M φ and C φ with factors of each line."""

@@ -14,6 +14,7 @@ from fenics_hytf.motion.intensity import (
     significant_duration,
 )
 from fenics_hytf.motion.lapses import Segment, split
+from fenics_hytf.motion.rational import from_few
 from fenics_hytf.motion.records import GRAVITY, Record, RecordError
 from fenics_hytf.motion.response import default_periods, response_spectrum
 from fenics_hytf.motion.sliding_block import (
@@ -57,6 +58,7 @@ __all__ = [
     "excited_lines",
     "fourier_amplitude",
     "frequencies",
+    "from_few",
     "harmonic",
     "integrated",
     "intensity_measures",
