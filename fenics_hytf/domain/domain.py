@@ -24,6 +24,7 @@ from fenics_hytf.domain.checks import (
 )
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh, emptied
+from fenics_hytf.domain.refine import refined
 from fenics_hytf.scene import (
     Fault,
     Scene,
@@ -230,6 +231,8 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
         data = box_mesh(mesh.box, mesh, soils)
     else:
         data = read_mesh(Path(mesh.file or ""), (*soils, *mesh.empty))
+        for _ in range(mesh.refine):
+            data = refined(data)
     faults = _unknown_regions(mesh.empty, data)
     data = emptied(data, mesh.empty)
     if not data.region_names:

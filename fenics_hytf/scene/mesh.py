@@ -38,6 +38,7 @@ AXES = ("x", "y", "z")
 _MOST_CELLS = 1_000_000  # along one direction; more is a slip of the pen
 _MOST_CHECKED = 10_000_000  # cells of a box whose regions are checked here
 _CHECKED_AT_ONCE = 1_000_000
+_MOST_REFINED = 4  # times; 256 or 4096 cells of one
 
 _CellCount = Annotated[int, Field(ge=1, le=_MOST_CELLS)]
 
@@ -128,6 +129,7 @@ class Mesh(Table):
         column: Layered column (2D).
         box: Box (2D or 3D).
         file: Mesh file, absolute path.
+        refine: How many times each cell of a file is divided, every edge in two.
         regions: Which soil is where in a box.
         empty: Names of regions without soil, background for points to move into; where any is
             named, cells may be filled in part.
@@ -143,6 +145,9 @@ class Mesh(Table):
     column: Column | None = Field(None, description="a table with width and layers")
     box: Box | None = Field(None, description="a table with size and cells")
     file: Path | None = Field(None, description="the path of a mesh file")
+    refine: Annotated[int, Field(ge=0, le=_MOST_REFINED)] = Field(
+        0, description=f"a whole number from 0 to {_MOST_REFINED}"
+    )
     regions: Several[Region] = Field((), description="an array of tables with soil and a place")
     empty: Several[Name] = Field((), description="names of regions without soil")
     degree: Literal[1, 2] = Field(1, description="1 or 2")
@@ -164,6 +169,9 @@ class Mesh(Table):
             yield Fault(
                 join_key(key, "regions"), toml_text(raw["regions"]), "regions with box only"
             )
+        if "refine" in raw and "file" not in raw:
+            expected = "nothing without file: a box or a column has numbers of cells"
+            yield Fault(join_key(key, "refine"), toml_text(raw["refine"]), expected)
         for i, region in enumerate(as_list(raw.get("regions"))):
             if isinstance(region, dict):
                 where = join_key(key, "regions", i)
