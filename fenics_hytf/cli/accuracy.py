@@ -136,12 +136,12 @@ def closing_words(study: Study, folder: Path) -> str:
     Returns:
         Lines of text.
     """
-    from fenics_hytf.study.tables import FIGURE, RECORD, TABLE, table, twin_table
+    from fenics_hytf.study.tables import FIGURE, RECORD, TABLE, slip_table, table, twin_table
 
     text = f"errors against the {study.reference.text}"
     if study.reference.uncertainty:
         text += f", itself uncertain by {100 * study.reference.uncertainty:.2g} %"
-    parts = [f"{study.title}\n{text}", table(study), twin_table(study)]
+    parts = [f"{study.title}\n{text}", table(study), slip_table(study), twin_table(study)]
     parts.append("\n".join(study.sentences))
     failed = [p for p in (*study.points, *study.twin.points) if p.failure]
     notes = [

@@ -13,6 +13,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,7 @@ from fenics_hytf.study.records import (
     core_s,
 )
 from fenics_hytf.study.runs import Job, Outcome, Runner
+from fenics_hytf.study.slides import SLIP, apart
 from fenics_hytf.study.uncertainty import uncertainty
 from fenics_hytf.study.verdict import sentences
 
@@ -94,6 +96,7 @@ class _Course:
         self._errors: dict[Setting, Error] = {}
         self._yardstick: Yardstick | None = None
         self._reference = Reference("", 0.0)
+        self._slip_reference: Reference | None = None
         self._finest: Setting | None = None
         self._twin = time_domain.nothing("there was no time left for it")
         self._limit: float | None = None
@@ -103,9 +106,8 @@ class _Course:
         """All steps."""
         knobs = self.knobs
         try:
-            self._refer(
-                "closed form: vertical waves through level layers", closed_form(self._scene)
-            )
+            response = closed_form(self._scene)
+            self._refer("closed form: vertical waves through level layers", response, {})
         except NoClosedForm as no:
             knobs.notes.append(f"no closed form: {no}")
         own_cost = self._own()
@@ -114,9 +116,9 @@ class _Course:
         fine = self._first_that_runs(affordable(knobs, costs, own_cost, FINE), knobs.own)
         if self._yardstick is None:
             finest = self._first_that_runs(affordable(knobs, costs, own_cost, FINEST), fine)
-            response = self._outcomes[finest].response
-            assert response is not None  # it ran
-            self._refer(f"finest run ({knobs.name(finest)})", response)
+            found = self._outcomes[finest]
+            assert found.response is not None  # it ran
+            self._refer(f"finest run ({knobs.name(finest)})", found.response, found.slid)
             self._finest = finest
         knobs.notes += left_out(knobs, self._finest or fine)
         turned = self._turned_from(fine)
@@ -180,6 +182,8 @@ class _Course:
     def _direct_ratio(self) -> float:
         """What a direct sweep costs over a reduced one; it is left out where it does not end."""
         own = self.knobs.own
+        if 0.0 not in self.knobs.values["sweep"]:
+            return 1.0
         reduced = own if own.sweep else own.turned("sweep", OTHER_SWEEP)
         direct = own.turned("sweep", 0.0)
         costs = [self._try_out(each, "either sweep").cost for each in (reduced, direct)]
@@ -200,26 +204,30 @@ class _Course:
         nothing = max(_NOTHING, _OFF * own.sweep)
         base = self._outcomes[own].response
         assert base is not None
-        measure = self._against(base)
+        measure = self._against(base, {})
         for points in (fewest, most):
             response = self._try_out(own.turned("points", points), "from own").response
             if response is None or measure.distance(response, base) > nothing:
                 return
         self.knobs.settle("points")
 
-    def _against(self, response: RealArray) -> Yardstick:
-        """What measures against a response."""
-        return Yardstick(response, self._scene.dt, tuple(self._scene.output.receivers))
+    def _against(self, response: RealArray, slid: Mapping[str, float]) -> Yardstick:
+        """What measures against a response, and what slid in it."""
+        return Yardstick(response, self._scene.dt, tuple(self._scene.output.receivers), slid)
 
-    def _refer(self, text: str, response: RealArray) -> None:
-        """Measure from here on against a response."""
-        self._yardstick = self._against(response)
+    def _refer(self, text: str, response: RealArray, slid: Mapping[str, float]) -> None:
+        """Measure from here on against a response, and what slid in it."""
+        self._yardstick = self._against(response, slid)
         self._reference = Reference(text, 0.0)
+        if slid.get(SLIP):
+            self._slip_reference = Reference(text, 0.0)
+        elif slid:
+            self.knobs.notes.append("slip: nothing slides in the reference")
 
     def _first_that_runs(self, setting: Setting, last: Setting) -> Setting:
         """A fine setting; with one knob after the other as in the last resort, until it runs."""
         attempts = [setting]
-        for knob in ("loop", "cells", "degree", "band", "sweep", "points", "lapses"):
+        for knob in ("loop", "step", "cells", "degree", "band", "sweep", "points", "lapses"):
             attempts.append(attempts[-1].turned(knob, getattr(last, knob)))
         return next(s for s in dict.fromkeys(attempts) if not self._try_out(s, "fine").failure)
 
@@ -248,15 +256,24 @@ class _Course:
         """Estimate the error of a reference that is a run itself."""
         if self._finest is None:
             return
-        base = self._outcomes[fine].response
-        assert base is not None
-        distance = {
-            setting: self._measure.distance(found.response, base)
-            for setting, found in self._good().items()
-            if found.response is not None
-        }
+        base = self._outcomes[fine]
+        assert base.response is not None
+        distance, slips = {}, {}
+        for setting, found in self._good().items():
+            assert found.response is not None  # it ran
+            distance[setting] = self._measure.distance(found.response, base.response)
+            slips[setting] = apart(found.slid, base.slid).get(SLIP, 0.0)
+        self._reference = self._doubted(self._reference, fine, distance)
+        if self._slip_reference is not None:
+            self._slip_reference = self._doubted(self._slip_reference, fine, slips)
+
+    def _doubted(
+        self, reference: Reference, fine: Setting, distance: Mapping[Setting, float]
+    ) -> Reference:
+        """A run as the reference, with what it is uncertain by."""
+        assert self._finest is not None
         parts = uncertainty(self.knobs, fine, self._finest, distance)
-        self._reference = Reference(self._reference.text, sum(parts.values()), parts)
+        return Reference(reference.text, sum(parts.values()), parts)
 
     def _seek(self, prediction: Prediction) -> None:
         """Run the settings that are predicted to be the cheapest for each target."""
@@ -305,11 +322,11 @@ class _Course:
 
     def _error(self, setting: Setting) -> Error | None:
         """Error of a setting, measured once; ``None`` if it failed."""
-        response = self._outcomes[setting].response
-        if response is None or self._yardstick is None:
+        found = self._outcomes[setting]
+        if found.response is None or self._yardstick is None:
             return None
         if setting not in self._errors:
-            self._errors[setting] = self._yardstick.error(response)
+            self._errors[setting] = self._yardstick.error(found.response, found.slid)
         return self._errors[setting]
 
     def _points(self) -> list[Point]:
@@ -329,6 +346,7 @@ class _Course:
             turned=tuple(setting.differing(self.knobs.own)),
             values={knob: self.knobs.value(knob, setting) for knob in KNOBS},
             words={knob: self.knobs.describe(knob, setting) for knob in KNOBS},
+            slid=found.slid,
         )
 
     def study(self, complete: bool) -> Study:
@@ -341,6 +359,7 @@ class _Course:
             own=self._point(self.knobs.own),
             finest=None if self._finest is None else self._point(self._finest),
             reference=self._reference,
+            slip_reference=self._slip_reference,
             twin=self._twin,
             sentences=(),
             notes=tuple(self.knobs.notes),

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The work-precision figure: error against core-seconds, the scene left, its viscous twin right."""
+"""The work-precision figure: error against core-seconds, the scene left, its viscous twin right.
+
+Of a scene that slides the error of its slip stands between them.
+"""
 
 from __future__ import annotations
 
@@ -32,14 +35,15 @@ from fenics_hytf.study.records import (
 )
 from fenics_hytf.study.time_domain import METHODS, SWEEPS
 
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-_KNOBS = {knob: ((*COLOURS, QUIET)[i], _MARKERS[i]) for i, knob in enumerate(LABELS)}
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "p")
+_KNOBS = {knob: ((*COLOURS, QUIET, INK)[i], _MARKERS[i]) for i, knob in enumerate(LABELS)}
 _METHODS = {
     "direct": (COLOURS[0], "D"),
     "reduced": (COLOURS[0], "o"),
     "newmark": (COLOURS[1], "s"),
     "hht": (COLOURS[3], "^"),
 }
+_OF_ACCELERATION = "Relative L2 error of total acceleration [%]"
 _FLOOR = 1e-10  # %: rounding; smaller errors are drawn there
 _TWIN_FLOOR = 1e-4  # %: smaller differences from the direct sweep are drawn there
 _BESIDE = {"newmark": (-11, -12), "hht": (6, 4)}  # where steps are named
@@ -63,13 +67,16 @@ def work_precision(study: Study) -> Figure:
     Returns:
         The figure.
     """
-    both = bool(study.twin.points)
-    figure = Figure(figsize=(13.0 if both else 7.5, 6.6))
-    panels = figure.subplots(1, 2 if both else 1, squeeze=False)[0]
+    slip, both = study.of_slip(), bool(study.twin.points)
+    count = 1 + (slip is not None) + both
+    figure = Figure(figsize=(7.5 if count == 1 else 6.5 * count, 6.6))
+    panels = figure.subplots(1, count, squeeze=False)[0]
     figure.suptitle(label(study.title, 90), x=0.01, ha="left", fontsize=12)
-    _scene(panels[0], study)
+    _scene(panels[0], study, "Error", _OF_ACCELERATION)
+    if slip is not None:
+        _scene(panels[1], slip, "Error of the slip", "Relative error of the slip [%]")
     if both:
-        _twin(panels[1], study.twin)
+        _twin(panels[-1], study.twin)
     for axes in panels:
         axes.legend(
             loc="upper left",
@@ -81,12 +88,12 @@ def work_precision(study: Study) -> Figure:
     return figure
 
 
-def _scene(axes: Axes, study: Study) -> None:
+def _scene(axes: Axes, study: Study, what: str, text: str) -> None:
     """What each knob does alone, candidates, the front and the scene as it is."""
     floor = _lowest(study.points, study.reference.uncertainty)
     for knob, text in LABELS.items():
         mine = [p for p in study.points if knob in p.families]
-        if len(measured(mine)) > 1:
+        if any("fine" not in point.families for point in measured(mine)):
             colour, marker = _KNOBS[knob]
             # Both families of the mesh are sizes, each at a degree of its own.
             mesh = f"{LABELS['cells']}, {mine[0].words['degree']}"
@@ -108,7 +115,7 @@ def _scene(axes: Axes, study: Study) -> None:
     if study.reference.uncertainty > 0:
         _doubt(axes, study)
     reference = study.reference.text.split(":")[0].split(" (")[0]  # without the details
-    _dress(axes, f"Error against the {reference}", floor)
+    _dress(axes, f"{what} against the {reference}", text, floor)
 
 
 def _star(axes: Axes, own: Point, floor: float) -> None:
@@ -186,7 +193,7 @@ def _twin(axes: Axes, twin: Comparison) -> None:
         if method in METHODS:
             _name_steps(axes, mine, floor, _BESIDE[method])
     _front(axes, twin.points, floor)
-    _dress(axes, "Viscous twin: frequency domain and time domain", floor)
+    _dress(axes, "Viscous twin: frequency domain and time domain", _OF_ACCELERATION, floor)
 
 
 def _series(
@@ -253,7 +260,7 @@ def _lowest(points: Iterable[Point], doubt: float) -> float:
     return max(min(least, 100 * doubt) if doubt else least, _BELOW_DOUBT * 100 * doubt, _FLOOR)
 
 
-def _dress(axes: Axes, title: str, floor: float) -> None:
+def _dress(axes: Axes, title: str, text: str, floor: float) -> None:
     """Scales, names, and the levels that settings are sought for."""
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -278,5 +285,5 @@ def _dress(axes: Axes, title: str, floor: float) -> None:
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("Cost [core-s]")
-    axes.set_ylabel("Relative L2 error of total acceleration [%]")
+    axes.set_ylabel(text)
     axes.set_title(title)

@@ -24,7 +24,9 @@ _CELLS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the scene's own numbers of cells
 _SWEEPS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 _BANDS = (0.25, 0.5, 1.0, 2.0)  # of the scene's own highest frequency
 _LAPSES = (1, 2, 4)
+_STEPS = (0.25, 0.5, 1.0, 2.0)  # of the scene's own number of time steps of the slip a sample
 _LOOPS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
+_REFINED = 2  # times that cells of a file are divided
 _FEWEST_SAMPLES = 32  # a lapse
 _NO_TAIL = 1e-6  # of the record, in the norm: what a wider band may add without being another
 _ITERATIONS = 200  # at least, of a loop that is to change less than the scene asks for
@@ -42,6 +44,7 @@ class Setting:
         band: Highest frequency [Hz].
         lapses: Number of lapses.
         loop: Tolerance of the equivalent-linear loop [-]; 0 without it.
+        step: Longest time step of the slip [s]; 0 where nothing slides.
     """
 
     cells: float
@@ -51,6 +54,7 @@ class Setting:
     band: float
     lapses: int
     loop: float
+    step: float
 
     def turned(self, knob: str, value: float) -> Setting:
         """The same with another value of one knob."""
@@ -74,7 +78,10 @@ LABELS = {
     "band": "maximum frequency",
     "lapses": "number of lapses",
     "loop": "equivalent-linear tolerance",
+    "step": "time step of the slip",
 }
+
+_DIMENSIONS = {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 3}
 
 
 class Knobs:
@@ -96,6 +103,7 @@ class Knobs:
         self.scene, self._cell_type = scene, cell_type
         self.notes: list[str] = []
         mesh, solver, loop = scene.mesh, scene.solver, scene.effects.equivalent_linear
+        sliding = scene.effects.sliding
         self.nyquist = 0.5 / scene.dt
         band = min(solver.max_frequency or self.nyquist, self.nyquist)
         self.own = Setting(
@@ -106,6 +114,7 @@ class Knobs:
             band=band,
             lapses=len(scene.segments),
             loop=loop.tolerance if loop is not None else 0.0,
+            step=sliding.time_step if sliding is not None else 0.0,
         )
         values = {
             "cells": self._cells(),
@@ -115,8 +124,15 @@ class Knobs:
             "band": self._bands(),
             "lapses": self._lapses(),
             "loop": sorted({*_LOOPS, self.own.loop}, reverse=True) if loop is not None else (),
+            "step": self._steps() if sliding is not None else (),
         }
-        values["sweep"] = [*values["sweep"], 0.0]
+        if sliding is None or not self.own.sweep:
+            values["sweep"] = [*values["sweep"], 0.0]
+        else:
+            self.notes.append(
+                "sweep tolerance: no direct sweep, which is a factorisation for each time step of "
+                "the slip"
+            )
         self.values = {name: tuple(found) for name, found in values.items() if len(found) > 1}
 
     def overrides(self, setting: Setting) -> Overrides:
@@ -150,7 +166,9 @@ class Knobs:
                 changes["lapses", "count"] = setting.lapses
             changes |= self._kept()
         if "loop" in turned:
-            changes |= self._looped(setting.loop)
+            changes |= self._effect("equivalent_linear", self._looped(setting.loop))
+        if "step" in turned:
+            changes |= self._effect("sliding", {"time_step": setting.step})
         return changes
 
     def data(self, setting: Setting) -> dict[str, Any]:
@@ -162,6 +180,8 @@ class Knobs:
         data = copy.deepcopy(self.scene.data)
         for name, receiver in self.scene.output.receivers.items():
             data["output"]["receivers"][name] = list(receiver.place)
+        if self.scene.effects.sliding is not None and self.scene.output.every > 1:
+            data["output"]["every"] = 1  # where points come to is looked at, at the end
         for path, value in self.overrides(setting).items():
             _place(data, path, value)
         return data
@@ -192,6 +212,8 @@ class Knobs:
             return f"{value:.4g} Hz"
         if knob == "lapses":
             return f"{value} lapse{'s' if value > 1 else ''}"
+        if knob == "step":
+            return f"slip in steps of {1e3 * value:g} ms"
         return f"degree {value}" if knob == "degree" else f"loop to {value:g}"
 
     def name(self, setting: Setting) -> str:
@@ -244,6 +266,11 @@ class Knobs:
         return self.values[knob][-1] if knob in self.values else getattr(self.own, knob)
 
     @property
+    def dimension(self) -> int:
+        """Number of directions that a finer mesh is finer in."""
+        return 1 if self.scene.mesh.column is not None else _DIMENSIONS[self._cell_type]
+
+    @property
     def _lapses_differ(self) -> bool:
         effects = self.scene.effects
         changing = (effects.equivalent_linear, effects.degradation)
@@ -267,8 +294,8 @@ class Knobs:
     def _cells(self) -> list[float]:
         """Refinements that give meshes of their own, coarse to fine."""
         if self.scene.mesh.file is not None:
-            self.notes.append("mesh size: the mesh is a file, and is not meshed anew")
-            return [1.0]
+            self.notes.append("mesh size: the mesh is a file, whose cells are divided as they are")
+            return [2.0**times for times in range(-self.scene.mesh.refine, _REFINED + 1)]
         found: dict[tuple[Any, ...], float] = {}
         for factor in (1.0, *_CELLS):  # the scene's own first: it stays where others are the same
             counts = tuple(_flat(self._refined(factor)))
@@ -288,17 +315,26 @@ class Knobs:
         data = self.scene.data
         return {(a, b): value for (a, b), value in kept.items() if b not in data.get(a, {})}
 
-    def _looped(self, tolerance: float) -> Overrides:
+    def _looped(self, tolerance: float) -> dict[str, Any]:
         """Another tolerance of the loop, with the iterations that a smaller one takes."""
-        path: Path = ("effects", "equivalent_linear")
         loop = self.scene.effects.equivalent_linear
         assert loop is not None
         table: dict[str, Any] = {"tolerance": tolerance}
         if tolerance < self.own.loop and loop.max_iterations < _ITERATIONS:
             table["max_iterations"] = _ITERATIONS
-        if not isinstance(self.scene.data["effects"]["equivalent_linear"], dict):
-            return {path: table}
-        return {(*path, name): value for name, value in table.items()}
+        return table
+
+    def _effect(self, name: str, table: dict[str, Any]) -> Overrides:
+        """Other keys of an effect, which the scene may have called for by ``true``."""
+        if not isinstance(self.scene.data["effects"][name], dict):
+            return {("effects", name): table}
+        return {("effects", name, key): value for key, value in table.items()}
+
+    def _steps(self) -> list[float]:
+        """Time steps of the slip, long to short: a quarter to twice as many a sample, if whole."""
+        own = math.ceil(self.scene.dt / self.own.step - 1e-9)
+        counts = {own * factor for factor in _STEPS if float(own * factor).is_integer()}
+        return [self.own.step if n == own else self.scene.dt / n for n in sorted(counts)]
 
     def _counts(self) -> Overrides:
         mesh = self.scene.mesh
@@ -309,7 +345,9 @@ class Knobs:
         return {("mesh", "box", "cells"): list(mesh.box.cells)}
 
     def _refined(self, factor: float) -> Overrides:
-        """Numbers of cells times a factor, at least one."""
+        """Numbers of cells times a factor, at least one; cells of a file divided."""
+        if self.scene.mesh.file is not None:
+            return {("mesh", "refine"): self.scene.mesh.refine + round(math.log2(factor))}
 
         def times(count: int | list[int]) -> int | list[int]:
             if isinstance(count, list):

@@ -5,17 +5,21 @@
   receivers the worst one counts;
 - max |ln PSA/PSA_ref|, 5 % damped pseudo-acceleration over 0.05 to 5 s, over all receivers and the
   components that move.
+
+Of ground that slides the relative difference of its slip, and of what else is told of it, stands
+beside them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import response_spectrum
+from fenics_hytf.study.slides import apart
 
 RealArray = npt.NDArray[np.float64]
 
@@ -36,11 +40,13 @@ class Error:
         relative_l2: Of the worst receiver [-].
         ln_psa: Largest |ln PSA ratio| [-].
         receiver: Name of the worst receiver in L2.
+        slides: Relative differences of what slid, by the keys of ``slides.MEASURES`` [-].
     """
 
     relative_l2: float
     ln_psa: float
     receiver: str
+    slides: Mapping[str, float] = field(default_factory=dict)
 
 
 class Yardstick:
@@ -51,18 +57,25 @@ class Yardstick:
             ``(num_receivers, num_components, num_samples)``.
         dt: Time step [s].
         names: Of the receivers.
+        slid: What slid in the reference, by the keys of ``slides.MEASURES``.
 
     Raises:
         ValueError: If the reference does not move, or is not a number somewhere.
     """
 
-    def __init__(self, reference: RealArray, dt: float, names: Sequence[str]) -> None:
+    def __init__(
+        self,
+        reference: RealArray,
+        dt: float,
+        names: Sequence[str],
+        slid: Mapping[str, float] | None = None,
+    ) -> None:
         if not np.isfinite(reference).all():
             raise ValueError("the reference response: found values that are not numbers")
         norms = np.linalg.norm(reference, axis=(1, 2))
         if not norms.max(initial=0.0) > 0:
             raise ValueError("the reference response: found no motion; expected a receiver's")
-        self.reference = reference
+        self.reference, self.slid = reference, {} if slid is None else dict(slid)
         self._dt, self._names = dt, list(names)
         self._moving = norms > _STILL * norms.max()
         peaks = np.abs(reference).max(axis=2)
@@ -88,13 +101,14 @@ class Yardstick:
         norms[~self._moving] = np.inf
         return np.asarray(np.linalg.norm(difference, axis=(1, 2)) / norms)
 
-    def error(self, response: RealArray) -> Error:
+    def error(self, response: RealArray, slid: Mapping[str, float] | None = None) -> Error:
         """Distance of a response.
 
         Lapses that do not divide the record pad it; the samples that both have are compared.
 
         Args:
             response: As the reference; it may have more or fewer samples.
+            slid: What slid.
 
         Returns:
             The distance.
@@ -105,7 +119,8 @@ class Yardstick:
         spectra = self._spectrum(self.fitted(response))
         with np.errstate(divide="ignore"):  # a response of nought is infinitely far in ln
             ratio = np.abs(np.log(spectra / self._spectra))
-        return Error(float(by_receiver[worst]), float(ratio.max()), self._names[worst])
+        slides = apart(slid or {}, self.slid)
+        return Error(float(by_receiver[worst]), float(ratio.max()), self._names[worst], slides)
 
     def distance(self, one: RealArray, other: RealArray) -> float:
         """Relative L2 norm of a difference, of the worst receiver [-]."""

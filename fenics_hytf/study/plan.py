@@ -14,9 +14,11 @@ from fenics_hytf.study.knobs import LABELS, Knobs, Setting
 
 _EXPONENTS = {1: 0.9, 2: 1.2, 3: 1.6}  # of n, by the number of directions that are refined
 _REDUCED_LINES = 0.5  # exponent of the number of lines: more of them share a factorisation
+_SLIDING = 0.6  # of these exponents where ground slides: most is the kernel, in the sweep's basis
+_STEPS = 0.5  # exponent of the number of time steps of the slip: of a run, the kernel is a part
 # which gives way first, a value at a time; then each as far as the scene's own value
-_ORDER = ("sweep", "cells", "band", "loop", "sweep", "cells", "degree")
-_REST = ("band", "loop", "sweep", "cells", "degree", "points")
+_ORDER = ("sweep", "cells", "band", "loop", "step", "sweep", "cells", "degree")
+_REST = ("band", "loop", "step", "sweep", "cells", "degree", "points")
 _DIGITS = 2.0  # what a sweep or loop costs before its first digit, in digits
 OTHER_SWEEP = 1e-6
 """Tolerance of a reduced sweep where the scene's own is direct."""
@@ -37,15 +39,15 @@ class Costs:
 
     def __init__(self, knobs: Knobs, own_cost: float, direct_ratio: float = 1.0) -> None:
         self._knobs, self._own_cost, self._direct_ratio = knobs, own_cost, direct_ratio
-        mesh = knobs.scene.mesh
-        self._dim = 1 if mesh.column is not None else mesh.gdim or 2
 
     def predict(self, setting: Setting) -> float:
         """Core-seconds of a setting."""
         return self._own_cost * self._weight(setting) / self._weight(self._knobs.own)
 
     def _weight(self, setting: Setting) -> float:
-        size = (setting.cells * setting.degree) ** (self._dim * _EXPONENTS[self._dim])
+        dim = self._knobs.dimension
+        exponent = dim * _EXPONENTS[dim] * (_SLIDING if setting.step else 1.0)
+        size = (setting.cells * setting.degree) ** exponent
         lines = max(self._knobs.lines_up_to(setting.band), 1)
         swept = lines**_REDUCED_LINES
         if setting.sweep:
@@ -55,7 +57,8 @@ class Costs:
             digits = _DIGITS - math.log10(self._knobs.own.sweep or OTHER_SWEEP)
             swept = self._direct_ratio * digits * own_lines**_REDUCED_LINES * lines / own_lines
         iterations = _DIGITS - math.log10(setting.loop) if setting.loop else 1.0
-        return size * swept * iterations
+        steps = setting.step**-_STEPS if setting.step else 1.0
+        return size * swept * iterations * steps
 
 
 def affordable(knobs: Knobs, costs: Costs, own_cost: float, most: tuple[float, float]) -> Setting:

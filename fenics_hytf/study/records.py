@@ -9,6 +9,7 @@ from typing import Self
 
 from fenics_hytf.study.measures import Error
 from fenics_hytf.study.runs import Cost
+from fenics_hytf.study.slides import SLIP
 
 TARGETS = (0.05, 0.01, 0.001)
 """Errors that a cheapest setting is sought for, relative L2 [-]."""
@@ -43,6 +44,7 @@ class Point:
         values: Value of each knob.
         words: The same in words.
         substeps: Time steps per sample, of a march.
+        slid: What slid, by the keys of ``slides.MEASURES``.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Point:
     values: Mapping[str, float | str] = field(default_factory=dict)
     words: Mapping[str, str] = field(default_factory=dict)
     substeps: int = 0
+    slid: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def resolved(self) -> bool:
@@ -108,6 +111,7 @@ class Study:
         own: The scene as it is.
         finest: The reference, where it is a run.
         reference: What errors are measured against.
+        slip_reference: The same with what its slip is uncertain by; ``None`` where nothing slides.
         twin: Frequency domain and time domain on one problem.
         sentences: What follows, in words.
         notes: What was left out, and why.
@@ -123,10 +127,32 @@ class Study:
     sentences: tuple[str, ...]
     notes: tuple[str, ...]
     complete: bool
+    slip_reference: Reference | None = None
 
     def saying(self, sentences: Iterable[str]) -> Self:
         """The same with what follows."""
         return replace(self, sentences=tuple(sentences))
+
+    def of_slip(self) -> Self | None:
+        """The same with the error of the slip in place of that of the acceleration.
+
+        ``None`` where nothing slides.
+        """
+        reference = self.slip_reference
+        if reference is None:
+            return None
+
+        def seen(point: Point) -> Point:
+            error = point.error and replace(point.error, relative_l2=point.error.slides[SLIP])
+            return replace(point, error=error, doubt=reference.uncertainty)
+
+        return replace(
+            self,
+            points=tuple(seen(point) for point in self.points),
+            own=seen(self.own),
+            finest=self.finest and seen(self.finest),
+            reference=reference,
+        )
 
 
 @dataclass(frozen=True)

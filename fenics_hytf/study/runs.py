@@ -16,8 +16,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -45,7 +45,7 @@ _ROOMS = (  # that a run solves with, as :func:`_code` looks at them
     "lapse",
     "simulation",
 )
-_SHARED = ("_compat.py", "study/worker.py")
+_SHARED = ("_compat.py", "results/sliding.py", "study/slides.py", "study/worker.py")
 _MARCHING = ("study/newmark.py", "study/matrices.py")
 _ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -112,12 +112,14 @@ class Outcome:
             num_components, num_samples)``; ``None`` if it failed.
         failure: Why it failed.
         kept: Whether it was found, not run.
+        slid: What slid, by the keys of ``slides.MEASURES``; empty where nothing is to slide.
     """
 
     cost: Cost | None
     response: RealArray | None
     failure: str = ""
     kept: bool = False
+    slid: Mapping[str, float] = field(default_factory=dict)
 
 
 class Runner(Protocol):
@@ -171,8 +173,10 @@ class Processes:
             return None
 
     def _read(self, key: str, kept: bool) -> Outcome:
-        cost = Cost(**json.loads((self._folder / f"{key}.json").read_text()))
-        return Outcome(cost, np.load(self._folder / f"{key}.npy", "r"), kept=kept)
+        record = json.loads((self._folder / f"{key}.json").read_text())
+        slid = record.pop("slid", {})
+        response = np.load(self._folder / f"{key}.npy", "r")
+        return Outcome(Cost(**record), response, kept=kept, slid=slid)
 
 
 def write_job(path: Path, job: Job) -> None:
@@ -193,9 +197,9 @@ def read_job(path: Path) -> Job:
     return Job(scene, record["method"], record["substeps"])
 
 
-def write_cost(path: Path, cost: Cost) -> None:
-    """Write what a run has cost."""
-    path.write_text(json.dumps(asdict(cost)))
+def write_cost(path: Path, cost: Cost, slid: Mapping[str, float]) -> None:
+    """Write what a run has cost, and what slid where anything was to."""
+    path.write_text(json.dumps(asdict(cost) | ({"slid": dict(slid)} if slid else {})))
 
 
 def _execute(place: Path, limit: float | None) -> str:

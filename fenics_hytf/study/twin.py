@@ -83,8 +83,13 @@ def _require_a_twin(scene: Scene) -> None:
     """Refuse what has no viscous counterpart.
 
     Raises:
-        ValueError: Free field, or an absorbing layer.
+        ValueError: Free field, an absorbing layer, or regions without soil.
     """
+    if scene.mesh.empty:
+        raise ValueError(
+            "mesh.empty: found regions without soil, whose nodes have no mass to march; expected "
+            "soil everywhere"
+        )
     if "free_field" in scene.supports.values():
         raise ValueError(
             'boundary: found "free_field", whose forces come from a sweep of their own; expected '

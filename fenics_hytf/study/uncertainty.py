@@ -4,6 +4,8 @@
 - mesh size: Richardson. With D₁ and D₂ the distances of the mesh twice and four times as coarse
   from the fine one, D₂/D₁ = 2^p + 1 gives the order p, kept between 1 and 2·degree + 2, and
   D₁/(2^p − 1) is left, less in the p-th power of what the finest mesh is finer by;
+- time step of the slip: the same with the steps, the order between 1 and 2 (a march that starts
+  from rest is of the first order, one that goes on of the second);
 - sweep: what a looser tolerance is off by, times the ratio of the two; a direct one is exact;
 - equivalent-linear loop: a third of what the next looser tolerance is off by, for it falls in
   steps of whole iterations; times the ratio of the finest tolerance to the fine one;
@@ -22,7 +24,7 @@ from collections.abc import Mapping
 from fenics_hytf.study.knobs import Knobs, Setting
 
 _LOOP_LEFT = 1 / 3
-_RATIO = 2.0  # of the mesh sizes
+_RATIO = 2.0  # of the mesh sizes, and of the steps
 
 
 def uncertainty(
@@ -45,8 +47,11 @@ def uncertainty(
         if not coarser:
             continue
         value, off = coarser[0]
+        away = [d for _, d in coarser]
         if knob == "cells":
-            parts[knob] = _mesh(fine, finest, [d for _, d in coarser])
+            parts[knob] = _left(away, 2 * fine.degree + 2, fine.cells / finest.cells)
+        elif knob == "step":
+            parts[knob] = _left(away, 2, finest.step / fine.step)
         elif knob == "sweep" and finest.sweep:
             parts[knob] = off * finest.sweep / value
         elif knob == "loop":
@@ -68,10 +73,15 @@ def _coarser(
     return [(value, distance[setting]) for value, setting in turned if setting in distance]
 
 
-def _mesh(fine: Setting, finest: Setting, off: list[float]) -> float:
-    """What Richardson leaves of the distance of the next coarser mesh."""
+def _left(off: list[float], highest: int, finer: float) -> float:
+    """What Richardson leaves of the distance of the next coarser mesh, or time step.
+
+    Args:
+        off: Distances of those that are 2, 4 … times as coarse from the fine one.
+        highest: Order at most.
+        finer: Size, or step, of the finest run over that of the fine one.
+    """
     order = 1.0
     if len(off) > 1 and off[0] > 0 and off[1] / off[0] > _RATIO + 1:
-        order = min(math.log2(off[1] / off[0] - 1), 2 * fine.degree + 2)
-    left = off[0] / (_RATIO**order - 1)
-    return left * (fine.cells / finest.cells) ** order
+        order = min(math.log2(off[1] / off[0] - 1), highest)
+    return off[0] / (_RATIO**order - 1) * finer**order

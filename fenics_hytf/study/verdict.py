@@ -17,6 +17,7 @@ from fenics_hytf.study.records import (
     error_of,
     measured,
 )
+from fenics_hytf.study.slides import SLIP
 from fenics_hytf.study.time_domain import METHODS
 
 
@@ -34,6 +35,7 @@ def sentences(study: Study) -> Iterator[str]:
     yield from _own(study)
     yield from _bottleneck(study)
     yield from _idle(study)
+    yield from _slip(study)
     yield from _twin(study.twin)
 
 
@@ -45,6 +47,22 @@ def percent(error: float) -> str:
 def seconds(value: float) -> str:
     """Core-seconds, two digits."""
     return f"{value:.2g} core-s" if value < 100 else f"{value:.0f} core-s"
+
+
+def _slip(study: Study) -> Iterator[str]:
+    """The same of the slip: what is cheapest of all that was run, and what holds it back."""
+    seen = study.of_slip()
+    if seen is None:
+        return
+    for target in TARGETS:
+        yield f"Slip, {_for_target(seen, target)}"
+    slip = f"{study.own.slid[SLIP]:.3g} m"
+    if seen.own == seen.finest:
+        yield f"Slip of the scene as it is: {slip}."
+        return
+    doubt = percent(seen.reference.uncertainty)
+    yield f"Slip of the scene as it is: {slip}, {percent(error_of(seen.own))} ± {doubt} off."
+    yield from (f"Slip: {sentence}" for sentence in _bottleneck(seen))
 
 
 def _for_target(study: Study, target: float) -> str:

@@ -4,25 +4,29 @@
 It reads ``job.json`` from the folder and leaves ``response.npy`` and ``cost.json`` there, or
 ``failure``. The clock runs from the scene in memory to the response on the disk: mesh, assembly,
 solution, response and output. Compiled forms and kernels are loaded before, by a run over the
-lowest lines alone. A run of less than two seconds is repeated and its fastest repetition counts.
+lowest lines alone, or, of lapses that go on, under a few samples. A run of less than two seconds
+is repeated and its fastest repetition counts.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import excited_lines, to_frequency
 from fenics_hytf.scene import Scene, SceneError
-from fenics_hytf.simulation import SimulationError, peak_memory, simulate
+from fenics_hytf.simulation import SimulationError, Snapshot, peak_memory, simulate
 from fenics_hytf.study.newmark import integrate
 from fenics_hytf.study.runs import COST, FAILURE, JOB, RESPONSE, Cost, Job, read_job, write_cost
+from fenics_hytf.study.slides import slid
 
 RealArray = npt.NDArray[np.float64]
 
@@ -34,12 +38,13 @@ _FEW_SAMPLES = 8
 
 @dataclass(frozen=True)
 class Work:
-    """The work of a run, as far as it is known."""
+    """The work of a run, as far as it is known, and what slid in it."""
 
     factorisations: int
     solves: int
     unknowns: int
     cells: int
+    slid: Mapping[str, float] = field(default_factory=dict)
 
 
 def main(folder: Path) -> int:
@@ -54,7 +59,7 @@ def main(folder: Path) -> int:
     try:
         job = read_job(folder / JOB)
         warm(job)
-        cost, response = measured(job, folder)
+        cost, response, moved = measured(job, folder)
     except SceneError as error:
         return _fail(folder, "; ".join(str(fault) for fault in error.faults))
     except SimulationError as error:
@@ -63,7 +68,7 @@ def main(folder: Path) -> int:
         return _fail(folder, "out of memory")
     if not np.isfinite(response).all():
         return _fail(folder, "the response holds values that are not numbers")
-    write_cost(folder / COST, cost)
+    write_cost(folder / COST, cost, moved)
     return 0
 
 
@@ -74,7 +79,7 @@ def warm(job: Job) -> None:
     """
     try:
         if job.method == "simulate":
-            _sweep_little(job.scene)
+            simulate(_little(job.scene))
         else:
             _march_little(job)
     except SimulationError:
@@ -83,34 +88,49 @@ def warm(job: Job) -> None:
 
 def _march_little(job: Job) -> None:
     """The scene under a few samples."""
-    scene, samples = job.scene, _FEW_SAMPLES
-    sine = {"amplitude": 1.0, "frequency": 1 / (samples * scene.dt), "cycles": 1}
-    motion = [
-        {"direction": each.direction, "input": each.input, "harmonic": sine | {"samples": samples}}
+    data = job.scene.data | {"motion": _few_samples(job.scene), "lapses": {}}
+    integrate(Scene.from_dict(data, job.scene.folder), job.method, job.substeps)
+
+
+def _few_samples(scene: Scene) -> list[dict[str, Any]]:
+    """Motions of a few samples."""
+    sine = {"amplitude": 1.0, "frequency": 1 / (_FEW_SAMPLES * scene.dt), "cycles": 1}
+    wave = sine | {"samples": _FEW_SAMPLES}
+    return [
+        {"direction": each.direction, "input": each.input, "harmonic": wave}
         for each in scene.motion
     ]
-    data = scene.data | {"motion": motion, "lapses": {}}
-    integrate(Scene.from_dict(data, scene.folder), job.method, job.substeps)
 
 
-def _sweep_little(scene: Scene) -> None:
-    """The scene over its lowest lines, its loop loose."""
-    acceleration = scene.base_acceleration
-    num_samples = acceleration.shape[1]
-    lines = excited_lines(to_frequency(acceleration), scene.dt, num_samples, scene.solver.excited)
-    if not len(lines):
-        return
-    first = lines[0] / (num_samples * scene.dt)
-    highest = max(first, _FEW_LINES / (scene.segments[0].num_samples * scene.dt))
-    data = scene.data | {"solver": scene.data.get("solver", {}) | {"max_frequency": float(highest)}}
+def _little(scene: Scene) -> Scene:
+    """The scene over its lowest lines, its loop loose; lapses that go on have no low lines alone.
+
+    Those are one lapse under a few samples.
+    """
+    solver = dict(scene.data.get("solver", {}))
+    data = dict(scene.data)
+    if scene.lapses.continuity == "transient":
+        solver["complex_modulus"] = scene.solver.complex_modulus
+        data |= {"motion": _few_samples(scene), "lapses": {"continuity": "transient"}}
+    else:
+        solver["max_frequency"] = _lowest(scene)
     loop = scene.effects.equivalent_linear
     if loop is not None:
         table = loop.model_dump(exclude={"magnitude"}) | {"tolerance": 0.5}
         data["effects"] = scene.data["effects"] | {"equivalent_linear": table}
-    simulate(Scene.from_dict(data, scene.folder))
+    return Scene.from_dict(data | {"solver": solver}, scene.folder)
 
 
-def measured(job: Job, folder: Path) -> tuple[Cost, RealArray]:
+def _lowest(scene: Scene) -> float:
+    """A frequency with few lines below it [Hz]."""
+    acceleration = scene.base_acceleration
+    num_samples = acceleration.shape[1]
+    lines = excited_lines(to_frequency(acceleration), scene.dt, num_samples, scene.solver.excited)
+    first = lines[0] / (num_samples * scene.dt) if len(lines) else 0.0
+    return float(max(first, _FEW_LINES / (scene.segments[0].num_samples * scene.dt)))
+
+
+def measured(job: Job, folder: Path) -> tuple[Cost, RealArray, Mapping[str, float]]:
     """Run a job, several times if it is short, and take the fastest.
 
     Args:
@@ -118,8 +138,8 @@ def measured(job: Job, folder: Path) -> tuple[Cost, RealArray]:
         folder: Where the response is written while the clock runs.
 
     Returns:
-        The cost, and the total acceleration of the receivers [m/s^2], shape ``(num_receivers,
-        num_components, num_samples)``.
+        The cost; the total acceleration of the receivers [m/s^2], shape ``(num_receivers,
+        num_components, num_samples)``; and what slid.
     """
     action = _action(job)
     seconds: list[tuple[float, float]] = []
@@ -138,7 +158,7 @@ def measured(job: Job, folder: Path) -> tuple[Cost, RealArray]:
         unknowns=work.unknowns,
         cells=work.cells,
     )
-    return cost, response
+    return cost, response, work.slid
 
 
 def _action(job: Job) -> Callable[[], tuple[RealArray, Work]]:
@@ -148,10 +168,13 @@ def _action(job: Job) -> Callable[[], tuple[RealArray, Work]]:
 
 
 def _simulated(scene: Scene) -> tuple[RealArray, Work]:
-    result = simulate(scene)
-    work = result.work
-    sizes = (result.sizes["unknowns"], result.sizes["cells"])
-    return result.history("total_acceleration"), Work(work.factorisations, work.solves, *sizes)
+    seen: deque[Snapshot] = deque(maxlen=1)
+    slides, moves = scene.effects.sliding is not None, scene.effects.convection
+    result = simulate(scene, snapshot=seen.append if slides and moves else None)
+    work, sizes = result.work, result.sizes
+    moved = slid(result, seen[-1] if seen else None)
+    done = Work(work.factorisations, work.solves, sizes["unknowns"], sizes["cells"], moved)
+    return result.history("total_acceleration"), done
 
 
 def _marched(job: Job) -> tuple[RealArray, Work]:

@@ -150,3 +150,13 @@ def test_the_record_is_padded_until_rest(figure):
 def test_no_twin(sections, reason):
     with pytest.raises(ValueError, match=reason):
         viscous_twin(column(**sections))
+
+
+def test_no_twin_beside_air():
+    regions = [{"soil": "sand", "below": 8.0}, {"soil": "air"}]
+    mesh = {"box": {"size": [1.0, 12.0], "cells": [1, 12]}, "regions": regions, "empty": ["air"]}
+    receivers = {"receivers": {"top": [0.5, 8.0]}}
+    motion = [RECORD | {"direction": "x"}]
+    given = scene(mesh, soil={"sand": SAND}, motion=motion, output=receivers)
+    with pytest.raises(ValueError, match="regions without soil"):
+        viscous_twin(given)
