@@ -21,8 +21,9 @@ import numpy.typing as npt
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.study import time_domain
 from fenics_hytf.study.closed_form import NoClosedForm, closed_form
-from fenics_hytf.study.knobs import KNOBS, MESH, Knobs, Setting, text_of
+from fenics_hytf.study.knobs import KNOBS, MESH, Knobs, Setting
 from fenics_hytf.study.measures import Error, Yardstick
+from fenics_hytf.study.overrides import text_of
 from fenics_hytf.study.plan import FINE, FINEST, OTHER_SWEEP, Costs, affordable, left_out
 from fenics_hytf.study.prediction import Forecast, Prediction
 from fenics_hytf.study.records import (

@@ -15,10 +15,7 @@ import numpy as np
 
 from fenics_hytf.motion import excited_lines, frequencies, to_frequency
 from fenics_hytf.scene import Mesh, Scene, allowed_points_per_cell, default_points_per_cell
-from fenics_hytf.scene.faults import toml_text
-
-Path = tuple[str | int, ...]
-Overrides = dict[Path, Any]
+from fenics_hytf.study.overrides import Overrides, place
 
 _CELLS = (0.25, 0.5, 1.0, 2.0, 4.0)  # of the scene's own numbers of cells
 _SWEEPS = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
@@ -183,7 +180,7 @@ class Knobs:
         if self.scene.effects.sliding is not None and self.scene.output.every > 1:
             data["output"]["every"] = 1  # where points come to is looked at, at the end
         for path, value in self.overrides(setting).items():
-            _place(data, path, value)
+            place(data, path, value)
         return data
 
     def scene_with(self, setting: Setting) -> Scene:
@@ -382,23 +379,6 @@ class Knobs:
         if self._lapses_differ:
             return [*sorted(counts - {own}), own]
         return sorted(counts, reverse=True)
-
-
-def text_of(overrides: Overrides) -> list[str]:
-    """Overrides as after ``--set``."""
-    return [f"{_key(path)}={toml_text(value)}" for path, value in overrides.items()]
-
-
-def _key(path: Path) -> str:
-    parts = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in path]
-    return "".join(parts).lstrip(".")
-
-
-def _place(data: dict[str, Any], path: Path, value: Any) -> None:
-    place: Any = data
-    for part in path[:-1]:
-        place = place.setdefault(part, {}) if isinstance(place, dict) else place[part]
-    place[path[-1]] = value
 
 
 def _flat(overrides: Overrides) -> list[int]:

@@ -11,8 +11,9 @@ from fenics_hytf.simulation import SimulationError, simulate
 from fenics_hytf.study import BudgetSpent, StudyError, conduct, time_domain
 from fenics_hytf.study.closed_form import closed_form
 from fenics_hytf.study.figure import draw_study
-from fenics_hytf.study.knobs import KNOBS, Knobs, text_of
+from fenics_hytf.study.knobs import KNOBS, Knobs
 from fenics_hytf.study.measures import Yardstick
+from fenics_hytf.study.overrides import text_of
 from fenics_hytf.study.plan import FINE, Costs, affordable, left_out
 from fenics_hytf.study.prediction import Prediction
 from fenics_hytf.study.runs import Cost, Outcome

@@ -13,7 +13,8 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import SimulationError, simulate
 from fenics_hytf.study import Processes, conduct, time_domain
 from fenics_hytf.study.figure import draw_study
-from fenics_hytf.study.knobs import Knobs, text_of
+from fenics_hytf.study.knobs import Knobs
+from fenics_hytf.study.overrides import text_of
 from fenics_hytf.study.plan import Costs
 from fenics_hytf.study.runs import Cost, Job, Outcome
 from fenics_hytf.study.slides import MEASURES, apart, slid
