@@ -113,3 +113,19 @@ def test_a_box_has_numbers_of_cells():
     mesh = {"box": {"size": [1.0, 1.0], "cells": [1, 1]}, "refine": 1}
     with pytest.raises(SceneError, match=r"mesh\.refine: found 1; expected nothing without file"):
         Scene.from_dict(scene({"box": mesh["box"]}, ("clay",)).data | {"mesh": mesh})
+
+
+@pytest.mark.mpi
+def test_a_file_divided_on_several_ranks(shared_path):
+    file = shared_path / "a.msh"
+    if MPI.COMM_WORLD.rank == 0:
+        gmsh_section(file, quads=True)
+    MPI.COMM_WORLD.Barrier()
+    fine = scene({"file": str(file), "refine": 1})
+    mine, alone = build(fine, MPI.COMM_WORLD), build(fine, MPI.COMM_SELF)
+    assert mine.num_cells == alone.num_cells
+    np.testing.assert_array_equal(
+        mine.gather_cells(mine.regions), alone.gather_cells(alone.regions)
+    )
+    for name, facets in alone.boundaries.items():
+        assert MPI.COMM_WORLD.allreduce(len(mine.boundaries[name])) >= len(facets)  # some by both
