@@ -91,6 +91,8 @@ def _mesh(mesh: Mesh) -> dict[str, Any]:
         text = f"box {size} m, {cells} {box.cell} cells"
     else:
         kind, text = "file", "" if mesh.file is None else mesh.file.name
+        if mesh.refine:
+            text += f", every edge in {2**mesh.refine}"
     kinematics = "" if mesh.kinematics is None else f", {mesh.kinematics.replace('_', ' ')}"
     return {"kind": kind, "text": f"{text}, degree {mesh.degree}{kinematics}", **described}
 

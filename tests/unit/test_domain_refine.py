@@ -12,6 +12,7 @@ from fenics_hytf.domain import build
 from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh
 from fenics_hytf.domain.refine import refined
+from fenics_hytf.results import describe_scene
 from fenics_hytf.scene import Box, Mesh, Scene, SceneError
 
 # A corner's edges, by its number: the vectors whose determinant is the size of a cell of equal
@@ -129,3 +130,9 @@ def test_a_file_divided_on_several_ranks(shared_path):
     )
     for name, facets in alone.boundaries.items():
         assert MPI.COMM_WORLD.allreduce(len(mine.boundaries[name])) >= len(facets)  # some by both
+
+
+def test_it_is_told(tmp_path):
+    file = str(gmsh_section(tmp_path / "a.msh"))
+    told = describe_scene(scene({"file": file, "refine": 2}), ("clay", "sand"))
+    assert told["mesh"]["text"].startswith("a.msh, every edge in 4, degree 1")

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fenics_hytf.scene import Scene
+from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import simulate
 from fenics_hytf.study import BudgetSpent, Processes, runs
 from fenics_hytf.study.runs import Job, read_job, write_job
 from fenics_hytf.study.twin import viscous_twin
+from fenics_hytf.study.worker import warm
 
 SAND = {"density": 1800.0, "shear_wave_velocity": 160.0, "poisson": 0.3, "damping": 0.05}
 CURVES = {"strain": [1e-6, 1e-4, 1e-2], "modulus": [1.0, 0.8, 0.1], "damping": [0.02, 0.05, 0.2]}
@@ -148,3 +149,11 @@ def test_peak_memory_is_that_of_the_program():
     before, grown = map(int, done.stdout.split())
     assert before < block.nbytes
     assert 0.9 * 2**27 < grown < 1.1 * 2**27  # 128 MiB
+
+
+def test_lapses_that_go_on_are_warmed_up_too():
+    """They bear no low frequency alone, which is what other scenes are warmed up with."""
+    data = column(lapses={"count": 2}, solver={}).data
+    with pytest.raises(SceneError, match="max_frequency"):
+        Scene.from_dict(data | {"solver": {"max_frequency": 1.0}})
+    warm(Job(Scene.from_dict(data)))
