@@ -88,7 +88,7 @@ def work_precision(study: Study) -> Figure:
     return figure
 
 
-def _scene(axes: Axes, study: Study, what: str, text: str) -> None:
+def _scene(axes: Axes, study: Study, what: str, quantity: str) -> None:
     """What each knob does alone, candidates, the front and the scene as it is."""
     floor = _lowest(study.points, study.reference.uncertainty)
     for knob, text in LABELS.items():
@@ -115,7 +115,7 @@ def _scene(axes: Axes, study: Study, what: str, text: str) -> None:
     if study.reference.uncertainty > 0:
         _doubt(axes, study)
     reference = study.reference.text.split(":")[0].split(" (")[0]  # without the details
-    _dress(axes, f"{what} against the {reference}", text, floor)
+    _dress(axes, f"{what} against the {reference}", quantity, floor)
 
 
 def _star(axes: Axes, own: Point, floor: float) -> None:
@@ -260,7 +260,7 @@ def _lowest(points: Iterable[Point], doubt: float) -> float:
     return max(min(least, 100 * doubt) if doubt else least, _BELOW_DOUBT * 100 * doubt, _FLOOR)
 
 
-def _dress(axes: Axes, title: str, text: str, floor: float) -> None:
+def _dress(axes: Axes, title: str, quantity: str, floor: float) -> None:
     """Scales, names, and the levels that settings are sought for."""
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -285,5 +285,5 @@ def _dress(axes: Axes, title: str, text: str, floor: float) -> None:
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlabel("Cost [core-s]")
-    axes.set_ylabel(text)
+    axes.set_ylabel(quantity)
     axes.set_title(title)
