@@ -291,6 +291,9 @@ class Knobs:
     def _cells(self) -> list[float]:
         """Refinements that give meshes of their own, coarse to fine."""
         if self.scene.mesh.file is not None:
+            if self.scene.effects.sliding is None:
+                self.notes.append("mesh size: the mesh is a file, and is not meshed anew")
+                return [1.0]
             self.notes.append("mesh size: the mesh is a file, whose cells are divided as they are")
             return [2.0**times for times in range(-self.scene.mesh.refine, _REFINED + 1)]
         found: dict[tuple[Any, ...], float] = {}

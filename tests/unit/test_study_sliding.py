@@ -85,6 +85,8 @@ def test_cells_of_a_file_are_divided():
         turned = knob.scene_with(knob.own.turned("cells", factor))
         assert turned.mesh.refine == times
     assert knob.dimension == 2
+    still = Scene.from_dict(data | {"effects": {"gravity": True}}, scene.folder)
+    assert "cells" not in knobs(still).values
     costs = Costs(knob, 1.0)
     assert 2.0 < costs.predict(knob.own.turned("cells", 2.0)) < 4.0  # four times the cells
 
