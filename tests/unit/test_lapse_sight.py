@@ -27,6 +27,7 @@ def shaken(law: str, tolerance: float):
             output={"receivers": {"top": [6.0, 6.0]}},
         ),
         WORLD,
+        group_size=WORLD.size if law == "maxwell" else 1,  # one mesh for all ranks, or one each
     )
 
 
