@@ -12,7 +12,7 @@ from fenics_hytf.simulation import simulate
 WORLD = MPI.COMM_WORLD
 
 
-def shaken(law: str, tolerance: float):
+def shaken(law: str, tolerance: float, comm: MPI.Comm = WORLD):
     """Two lapses that hand over, under a pulse."""
     motion = {"synthetic": {"pga_g": 0.2, "dt": 0.02, "n": 100, "f1": 0.5, "f2": 5.0}}
     return simulate(
@@ -26,8 +26,8 @@ def shaken(law: str, tolerance: float):
             solver={"complex_modulus": law, "tolerance": tolerance},
             output={"receivers": {"top": [6.0, 6.0]}},
         ),
-        WORLD,
-        group_size=WORLD.size if law == "maxwell" else 1,  # one mesh for all ranks, or one each
+        comm,
+        group_size=comm.size if law == "maxwell" else 1,  # one mesh for all ranks, or one each
     )
 
 
@@ -45,3 +45,14 @@ def test_by_directions_and_by_lines(law, tolerance, kind, monkeypatch, figure):
             found, expected = (getattr(lapse.cells, f"peak_{name}") for lapse in (one, other))
             worst = max(worst, np.abs(found - expected).max() / expected.max())
         figure(f"peak {name} by directions, {law}, tolerance {tolerance:g}", worst, limit)
+
+
+@pytest.mark.mpi
+def test_energy_on_ranks_that_share_a_mesh(figure):
+    shared, alone = shaken("maxwell", 1e-9), shaken("maxwell", 1e-9, MPI.COMM_SELF)
+    for one, other in zip(shared.lapses, alone.lapses, strict=True):
+        assert one.energy is not None and other.energy is not None
+        for name in ("input", "damping", "imbalance"):
+            found, expected = getattr(one.energy, name), getattr(other.energy, name)
+            # each sweep leaves up to its tolerance of every line
+            figure(f"energy, {name}", abs(found - expected) / other.energy.input, 1e-8)
