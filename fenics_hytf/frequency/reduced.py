@@ -141,6 +141,9 @@ def reduced_sweep(
         if directions is not None:
             growth.begin(directions)
         wanted = growth.first_expansions(expansions, block)
+        if len(lines) and not wanted:  # directions that are known may do
+            growth.check()
+            wanted = growth.next_expansions(block)
         while wanted:
             left = allowed - len(growth.expansions)
             if left <= 0:

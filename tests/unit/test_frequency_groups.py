@@ -75,6 +75,18 @@ def test_the_reduced_sweep_is_the_same_in_every_group(figure):
     assert shared.expansions == WORLD.bcast(shared.expansions)
 
 
+def test_directions_that_are_known_are_known_to_every_group():
+    system, lines = damped(springs(17, 19, seed=4)), 1j * np.linspace(0.5, 60.0, 200)
+    first = reduced_sweep(system, loads(323), lines[::2], TOLERANCE, across=WORLD)
+    options = {"across": WORLD, "directions": first.basis}
+    shared = reduced_sweep(system, loads(323), lines[1::2], TOLERANCE, **options)
+    assert shared.residuals.max() <= TOLERANCE
+    assert shared.factorisations <= WORLD.size
+    basis = np.concatenate(shared.basis.blocks, axis=1)
+    for mine in (basis, shared.coordinates):
+        np.testing.assert_array_equal(mine, WORLD.bcast(mine))
+
+
 def test_more_groups_than_lines():
     parts = springs(5, 5, seed=5)
     for lines in ([11j], []):

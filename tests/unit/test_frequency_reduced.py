@@ -155,6 +155,18 @@ def test_expansions_of_a_like_system_are_kept():
     assert worst(again, direct_sweep(damped(parts), b, LINES, 1e-10)) <= 10 * TOLERANCE
 
 
+def test_known_directions_are_not_sought_again(figure):
+    system, b = damped(springs(12, 15)), vector(np.random.default_rng(3).normal(size=180))
+    first = reduced_sweep(system, b, LINES, TOLERANCE)
+    between = 0.5 * (LINES[1:] + LINES[:-1])
+    assert reduced_sweep(system, b, LINES, TOLERANCE, directions=first.basis).factorisations == 0
+    found, _ = agree(system, b, between, figure, "lines between", directions=first.basis)
+    assert found.factorisations <= 1
+    # the same with another force: what is missing is found
+    c = vector(np.random.default_rng(4).normal(size=180))
+    agree(system, c, LINES, figure, "another force", directions=first.basis)
+
+
 def test_a_budget_that_is_too_small_names_the_lines():
     parts = springs(20, 20)
     b = vector(np.random.default_rng(9).normal(size=400))
