@@ -3,11 +3,9 @@
 
 from __future__ import annotations
 
-import logging
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any, get_type_hints
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -20,13 +18,10 @@ from fenics_hytf.lapse import (
     Energy,
     Equations,
     FreeField,
-    FreeFieldState,
     Ground,
     Handover,
     LapseResult,
-    Observer,
     Sliding,
-    SlipState,
     Softening,
     Solved,
     Statics,
@@ -39,7 +34,6 @@ from fenics_hytf.lapse import (
 )
 from fenics_hytf.motion import Segment
 from fenics_hytf.particles import (
-    MassLedger,
     gather_points,
     scatter_points,
     transfer_matrix,
@@ -53,37 +47,19 @@ from fenics_hytf.simulation.groups import Groups, require_same_parts
 from fenics_hytf.simulation.memory import peak_memory
 from fenics_hytf.simulation.observation import Observation
 from fenics_hytf.simulation.records import (
-    Progress,
     ProgressCallback,
     Result,
     Snapshot,
     SnapshotCallback,
     Work,
 )
+from fenics_hytf.simulation.reporter import Reporter
 from fenics_hytf.simulation.schedule import lapses_to_go, motion_of, samples
 from fenics_hytf.simulation.snapshots import take_snapshot
+from fenics_hytf.simulation.state import RunState
 from fenics_hytf.simulation.weighing import Weighing
-from fenics_hytf.soil import CyclicState
 
 RealArray = npt.NDArray[np.float64]
-
-logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True)
-class RunState:
-    """What a checkpoint holds; see :class:`Run`."""
-
-    lapses: tuple[LapseResult, ...]
-    work: Work
-    ledger: MassLedger
-    points: dict[str, npt.NDArray[Any]]
-    carried: RealArray
-    base_carried: RealArray
-    effective_strain: RealArray | None
-    free_fields: tuple[FreeFieldState, ...]
-    cycles: CyclicState | None
-    sliding: SlipState | None
 
 
 class Run:
@@ -103,7 +79,8 @@ class Run:
         self.lapses: list[LapseResult] = []
         self._work = Work(wall_s=self.clock.wall_s)
         self._assemblies: Counter[str] = Counter()
-        self._progress = progress if comm.rank == 0 else None
+        listener = progress if comm.rank == 0 else None
+        self._report = Reporter(listener, len(scene.segments), self.clock)
         self._strain_from = strain_from
         self._ground: Ground | None = None
         self._effective_strain: RealArray | None = None
@@ -192,9 +169,9 @@ class Run:
         with self.clock.phase("assembly"):
             excitation = self.continuity.excite(segment)
             self.continuity.begin(self.points, excitation)
-        observer = self._observer(index)
+        observer = self._report.observer(index)
         for column in self.free_fields:
-            self._count(column.solve(segment, self._observer(index, column.name)))
+            self._count(column.solve(segment, self._report.observer(index, column.name)))
         start = self._effective_strain  # of the lapse before
         solved = solve(
             self.scene,
@@ -388,13 +365,11 @@ class Run:
                 cycles=None if self._cycles is None else self._cycles.state,
                 sliding=None if self._sliding is None else self._sliding.state,
             )
-            parts = {name: getattr(state, name) for name in RunState.__dataclass_fields__}
-            checkpoint.save(len(self.lapses) - 1, self.domain.comm.size, parts)
+            checkpoint.save(len(self.lapses) - 1, self.domain.comm.size, state.parts())
 
     def restore(self, found: Checkpoint) -> None:
         """Go on from a checkpoint."""
-        kinds = get_type_hints(RunState)
-        state = RunState(**{name: found.load(name, kind) for name, kind in kinds.items()})
+        state = RunState.load(found)
         self.lapses = list(state.lapses)
         self.points = scatter_points(state.points, self.domain.mesh)
         self._ledger = state.ledger
@@ -414,27 +389,6 @@ class Run:
         for phase, seconds in state.work.wall_s.items():
             self.clock.wall_s[phase] = self.clock.wall_s.get(phase, 0.0) + seconds
         self._work = replace(state.work, wall_s=self.clock.wall_s)
-
-    def _observer(self, index: int, side: str = "") -> Observer:
-        return Observer(
-            lambda iteration, done, total: self._report(
-                index, "sweep", iteration=iteration, done=done, total=total, side=side
-            ),
-            lambda iteration, change: self._report(
-                index, "iteration", iteration=iteration, change=change, side=side
-            ),
-            self.clock.phase,
-        )
-
-    def _report(self, index: int, phase: str, **values: float | str) -> None:
-        if self._progress is None:
-            return
-        report = Progress(index, max(len(self.scene.segments), index + 1), phase, **values)  # type: ignore[arg-type]
-        try:
-            self._progress(report)
-        except Exception:  # rank 0 alone must not leave a run that others wait in
-            logger.warning("the progress callback failed and is not called again", exc_info=True)
-            self._progress = None
 
     def result(self) -> Result:
         """Everything so far."""
