@@ -15,7 +15,7 @@ from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.mechanism import Mechanism, MechanismSearch
 from fenics_hytf.lapse.statics import Statics
-from fenics_hytf.particles import Points
+from fenics_hytf.particles import Points, to_tensor
 from fenics_hytf.scene import Fault, Scene, SceneError
 from fenics_hytf.soil import shear_strength
 
@@ -24,6 +24,23 @@ RealArray = npt.NDArray[np.float64]
 # Of the largest strength: what soil without cohesion and confinement is given. Soil beside rock has
 # a thousandth of its strength, and a search found mechanisms between strengths 2e5 apart.
 _LEAST_STRENGTH = 1e-6
+
+
+def mean_pressure(stress: RealArray) -> RealArray:
+    """Mean of the major and the minor principal stress, compression positive.
+
+    In a section that of the two in its plane: the third lies between them where soil fails.
+
+    Args:
+        stress: Components of a point a row [Pa], shape ``(n, 3)`` or ``(n, 6)``.
+
+    Returns:
+        [Pa], shape ``(n,)``.
+    """
+    if stress.shape[1] == 3:
+        return np.asarray(-stress[:, :2].mean(axis=1))
+    principal = np.linalg.eigvalsh(to_tensor(stress))
+    return np.asarray(-principal[:, [0, -1]].mean(axis=1))
 
 
 class Slope:
@@ -76,8 +93,7 @@ class Slope:
 
     def _cell_strength(self, points: Points) -> RealArray:
         """Mean shear strength of every cell by volume [Pa]; 1 where there is no soil."""
-        gdim = self._domain.gdim
-        pressure = -points["stress"][:, :gdim].mean(axis=1)
+        pressure = mean_pressure(points["stress"])
         cohesion = self._cohesion[points.region]
         strength = shear_strength(cohesion, self._friction_angle[points.region], pressure)
         sums, one = np.zeros((self._domain.num_owned_cells, 2)), np.ones(len(points))
