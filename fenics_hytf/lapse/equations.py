@@ -192,6 +192,8 @@ class Equations:
         """
         before, self.filling = self.filling, filling
         if before is not None and filling.same_cells(before):
+            if self._ghost is not None:
+                filling.loosen(self._ghost, self._domain)
             return False
         self._clear()
         self.unknowns.destroy()

@@ -30,7 +30,7 @@ from fenics_hytf.domain import (
     normal_axis,
 )
 from fenics_hytf.lapse.errors import DetachedError
-from fenics_hytf.operators import STRENGTH, GhostForm, InternalForce, gauss_sites
+from fenics_hytf.operators import GhostForm, InternalForce, gauss_sites
 from fenics_hytf.particles import Points, take_out
 from fenics_hytf.scene import Scene, SceneError, default_kind
 
@@ -87,11 +87,18 @@ class Filling:
         both = domain.input_cells[cells]
         return facets[self.filled[both].all(axis=1) & self.loose[both].any(axis=1)]
 
-    def ghost(self, domain: Domain, strength: float = STRENGTH) -> GhostForm | None:
+    def ghost(self, domain: Domain, strength: float | None = None) -> GhostForm | None:
         """What holds loose cells; ``None`` where there are none."""
         if not self.loose.any():
             return None
-        return GhostForm(domain, self.ghost_facets(domain), strength)
+        ghost = GhostForm(domain, self.ghost_facets(domain), strength)
+        self.loosen(ghost, domain)
+        return ghost
+
+    def loosen(self, ghost: GhostForm, domain: Domain) -> None:
+        """Let loose cells be held: in space by the square of what they have lost."""
+        lost = 1.0 if domain.gdim == 2 else (1.0 - self.share) ** 2
+        ghost.loosen(np.where(self.loose, lost, 0.0)[domain.input_cells])
 
     def integrate(self, force: InternalForce, domain: Domain, points: Points) -> None:
         """Let forces be integrated over what is filled."""

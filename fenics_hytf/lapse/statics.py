@@ -29,7 +29,6 @@ from fenics_hytf.lapse.ground import Ground
 from fenics_hytf.lapse.material import ElasticConstants, elastic_constants
 from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.operators import (
-    STRENGTH,
     ElasticForm,
     GhostForm,
     InternalForce,
@@ -45,8 +44,8 @@ BALANCE = 1e-9
 
 _LEVEL = 1e-6  # shear over vertical stress, below which ground is level
 _STEPS = 40  # of spreading: points on Gauss points take one, others some ten
-# Strength of the ghost term here: it bears what acts on mechanisms, and hardly anything else.
-_LIGHTLY = 1e-6 * STRENGTH
+# a_K here, a millionth of the usual: it bears what acts on mechanisms, and hardly anything else.
+_LIGHTLY = 5e-8
 
 
 def static_supports(supports: dict[str, str]) -> dict[str, str]:
@@ -110,6 +109,8 @@ class Statics:
             bare = filling.bare_nodes(self._domain)
             self._unknowns = Unknowns(self._domain, self._supports, bare=bare)
             self._ghost = filling.ghost(self._domain, _LIGHTLY)
+        elif self._ghost is not None:
+            filling.loosen(self._ghost, self._domain)
         self._filling = filling
 
     def settle(self, points: Points, ground: Ground) -> None:
