@@ -51,8 +51,7 @@ def resample_matrix(mesh: Mesh, points: Points, degree: int, sites: Sites) -> sp
         discontinuous=True,
     )
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
-    psi = element.tabulate(0, points.X)[0, :, :, 0]
-    phi = element.tabulate(0, sites.X)[0, :, :, 0]
+    psi, phi = _tabulate(element, points.X), _tabulate(element, sites.X)
     constant = psi[0, 0] if len(psi) else 1.0
     weight = points.volume / np.bincount(points.cell, points.volume, owned)[points.cell]
     mean = np.zeros((owned, psi.shape[1]))
@@ -67,6 +66,13 @@ def resample_matrix(mesh: Mesh, points: Points, degree: int, sites: Sites) -> sp
     fit[:, 0] = weight / constant
     fit[:, 1:] = weight[:, None] * np.einsum("pij,pj->pi", inverse[points.cell], psi[:, 1:])
     return _by_cell(sites.cell, phi, points.cell, fit, owned)
+
+
+def _tabulate(element: basix.finite_element.FiniteElement, X: RealArray) -> RealArray:
+    """Its functions at reference places, shape ``(n, element.dim)``."""
+    if not len(X):  # at no place basix 0.9 ends the process
+        return np.empty((0, element.dim))
+    return np.asarray(element.tabulate(0, X)[0, :, :, 0])
 
 
 def _pseudo_inverse(gram: RealArray, least: float) -> RealArray:

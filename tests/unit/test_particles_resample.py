@@ -172,3 +172,14 @@ def test_no_points_and_no_places():
     points.assign(take(points.arrays(), points.id < 0))
     nowhere = Sites(np.zeros(0, np.int32), np.zeros((0, 2)))
     assert resample_matrix(mesh, points, 1, nowhere).shape == (0, 0)
+
+
+def test_a_rank_without_points_or_places():
+    """basix ends the process where it is asked for values at no place."""
+    mesh = distorted("quadrilateral")
+    points, centres = seeded(mesh, 1), cell_centres(mesh, 0, num_owned(mesh))
+    nowhere = cell_centres(mesh, 0, 0)
+    assert resample_matrix(mesh, points, 1, nowhere).shape == (0, len(points))
+    points.assign(take(points.arrays(), np.zeros(len(points), bool)))
+    R = resample_matrix(mesh, points, 1, centres)
+    assert R.shape == (num_owned(mesh), 0) and R.nnz == 0
