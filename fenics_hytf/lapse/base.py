@@ -148,7 +148,7 @@ def _base_force(domain: Domain, equations: Equations, response: Response) -> Com
     """Force on the base in the direction of each motion, shape ``(num_motions, num_lines)``."""
     given = response.excitation
     total = given.s**2 * _inertia_rows(domain, equations, response)
-    for motion, (axis, Mr) in enumerate(zip(given.axes, equations.influence, strict=True)):
+    for motion, (axis, Mr) in enumerate(zip(given.axes, equations.inertia.influence, strict=True)):
         mass = Mr.array_r[axis :: domain.num_components].real.sum()
         total[motion, motion] += domain.comm.allreduce(float(mass))
     return np.einsum("fmk,mk->fk", total, given.motion_weights)
@@ -156,7 +156,7 @@ def _base_force(domain: Domain, equations: Equations, response: Response) -> Com
 
 def _inertia_rows(domain: Domain, equations: Equations, response: Response) -> ComplexArray:
     """rᵀM T h of each direction and motion, shape ``(num_motions, num_motions, num_lines)``."""
-    owned = np.stack([Mr.array_r.real for Mr in equations.influence])
+    owned = np.stack([Mr.array_r.real for Mr in equations.inertia.influence])
     ghosts = domain.V.dofmap.index_map.num_ghosts * domain.num_components
     local = sparse.csr_matrix(np.pad(owned, ((0, 0), (0, ghosts))))
     rows = constrained_rows(domain, local, equations.T)

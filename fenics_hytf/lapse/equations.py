@@ -14,9 +14,8 @@ Matrices and forms are made once a run and refilled; what the scene does not cal
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +24,6 @@ from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import (
-    AffineLoads,
     DynamicSystem,
     Loads,
     ScalarFunction,
@@ -34,7 +32,9 @@ from fenics_hytf.frequency import (
 )
 from fenics_hytf.lapse.filling import Filling
 from fenics_hytf.lapse.ground import Ground
+from fenics_hytf.lapse.inertia import Inertia
 from fenics_hytf.lapse.material import ElasticConstants, Material, Part, rock_factors
+from fenics_hytf.lapse.sides import SideForce, Sides
 from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.operators import (
     DashpotForm,
@@ -51,21 +51,6 @@ from fenics_hytf.scene import Scene
 RealArray = npt.NDArray[np.float64]
 
 _PRODUCT = "matptap_via"  # how PETSc multiplies TᵀAT
-_MASS_TOLERANCE = 1e-14  # residual: what starts a lapse is known as well as it can be
-_MASS_STEPS = 200  # a consistent mass takes 20 to 40
-
-
-class SideForce(Protocol):
-    """What the ground beyond a side does to it; see :mod:`fenics_hytf.lapse.free_field`."""
-
-    def fasten(self, normal: RealArray, tangential: RealArray) -> None:
-        """Take the impedances of the section's cells [kg/(m² s)], shape ``(num_local_cells,)``."""
-
-    def add_force(self, line: int, side: int, nodal: PETSc.Vec) -> None:
-        """Add its nodal forces for a unit of a motion at a line, or for what it has carried."""
-
-    def add_start(self, derivative: int, nodal: PETSc.Vec) -> None:
-        """Add its nodal forces at the start of the lapse, or their rate."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +70,7 @@ class LapseEquations:
     """
 
     system: DynamicSystem
-    loads: list[PETSc.Vec] | Loads
+    loads: Sequence[PETSc.Vec] | Loads
     viscous: list[PETSc.Mat]
     drag: list[tuple[PETSc.Mat, float]]
     stiff: list[tuple[PETSc.Mat, float]]
@@ -100,6 +85,14 @@ class Equations:
         domain: The domain.
         assemblies: Counts assemblies by the name of the form.
         side_forces: Of the sides with free field.
+
+    Attributes:
+        axes: Component in which each motion acts.
+        unknowns: The unknowns; others once other cells are filled.
+        inertia: M r of the motions, and M⁻¹.
+        sides: What comes from beyond the sides.
+        base_is_held: Whether the base is not compliant.
+        filling: How far cells are filled, or ``None`` where every one is.
     """
 
     def __init__(
@@ -119,7 +112,7 @@ class Equations:
         self.unknowns = Unknowns(domain, supports, self.axes)
         sides = [name for name, kind in supports.items() if kind in ("dashpot", "free_field")]
         self._dashpots = DashpotForm(domain, sides) if sides else None
-        self._side_forces = side_forces
+        self.sides = Sides(side_forces)
         self.base_is_held = supports.get("base") != "compliant"
         self._K = self._elastic.create_matrix()
         self.filling: Filling | None = None
@@ -128,10 +121,7 @@ class Equations:
         # On the unknowns: mass, stiffness and damping by name, made when first needed.
         self._constrained: dict[str, PETSc.Mat] = {}
         self._radiating: list[tuple[PETSc.Mat, ScalarFunction]] = []
-        # Of each motion: M r at the nodes, and −TᵀM r.
-        self._influence: list[PETSc.Vec] = []
-        self._inertia: list[PETSc.Vec] = []
-        self._mass_solver: PETSc.KSP | None = None
+        self.inertia = Inertia(self.axes, domain.num_components)
 
     @property
     def across(self) -> MPI.Comm:
@@ -158,11 +148,6 @@ class Equations:
         """Unknowns of all ranks."""
         return len(self.unknowns)
 
-    @property
-    def influence(self) -> list[PETSc.Vec]:
-        """M r of each motion at the nodes [kg], borrowed until the points are weighed again."""
-        return self._influence
-
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
         self._clear()
@@ -171,15 +156,9 @@ class Equations:
 
     def _clear(self) -> None:
         """Destroy what is on the unknowns as they are."""
-        for owned in (*self._constrained.values(), *self._vectors()):
+        for owned in (*self._constrained.values(), self.inertia):
             owned.destroy()
-        self._constrained, self._radiating, self._influence, self._inertia = {}, [], [], []
-        if self._mass_solver is not None:
-            self._mass_solver.destroy()
-        self._mass_solver = None
-
-    def _vectors(self) -> list[PETSc.Vec]:
-        return [*self._influence, *self._inertia]
+        self._constrained, self._radiating = {}, []
 
     def occupy(self, filling: Filling) -> bool:
         """Take note of which cells are filled, and how far (collective).
@@ -227,17 +206,13 @@ class Equations:
         nodal = particle_mass_matrix(transfer_matrix(points, self._domain.V), points.mass)
         M = assemble_mass(self._domain, nodal, self._K)
         self._assemblies["mass"] += 1
-        for vector in self._vectors():
-            vector.destroy()
-        # M r on all nodes, before constraining: held ones pull on their neighbours too.
-        self._influence = [self._weigh_direction(M, direction) for direction in self.axes]
-        self._inertia = [self._inertia_force(Mr) for Mr in self._influence]
-        self._constrain("mass", M)
-        M.destroy()
+        held = self._constrain("mass", M)
         if self._ghost is not None:
-            self._hold_loose(self._ghost, points)
+            held = self._hold_loose(self._ghost, points)
+        self.inertia.weigh(M, self.T, held)
+        M.destroy()
 
-    def _hold_loose(self, ghost: GhostForm, points: Points) -> None:
+    def _hold_loose(self, ghost: GhostForm, points: Points) -> PETSc.Mat:
         """M and a ghost of its size, for nodes that hardly any point weighs on.
 
         What points carry is brought to the nodes with it: a point that has just come into a cell
@@ -249,6 +224,7 @@ class Equations:
         ghost.assemble(self._K, modulus)
         held = self._constrain("held mass", self._K)
         held.axpy(1.0, self.mass, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        return held
 
     def _pattern(self) -> None:
         """Give K its pattern, before any value is known, and the base its dashpots."""
@@ -277,19 +253,6 @@ class Equations:
             self._assemblies["dashpot"] += 1
             matrix = self._constrain(f"base {number}", self._K)
             self._radiating.append((matrix, radiation(factor)))
-
-    def _weigh_direction(self, M: PETSc.Mat, direction: int) -> PETSc.Vec:
-        r, Mr = M.createVecs()
-        r.array[direction :: self._domain.num_components] = 1.0
-        M.mult(r, Mr)
-        r.destroy()
-        return Mr
-
-    def _inertia_force(self, Mr: PETSc.Vec) -> PETSc.Vec:
-        force = self.T.createVecRight()
-        self.T.multTranspose(Mr, force)
-        force.scale(-1.0)
-        return force
 
     def _constrain(self, name: str, matrix: PETSc.Mat) -> PETSc.Mat:
         """A_q = TᵀAT, into the matrix kept under a name."""
@@ -355,7 +318,7 @@ class Equations:
         system = DynamicSystem(terms, self._constrained["mass"], damping)
         return LapseEquations(
             system,
-            self.with_sides(self._inertia),
+            self.sides.loads(self.inertia.forces, self.T),
             [matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
             self._drag(),
             stiff,
@@ -396,8 +359,7 @@ class Equations:
         impedance = self._weighted(np.sqrt(density * (lame + 2 * shear)), np.sqrt(density * shear))
         self._dashpots.assemble(self._K, *impedance)
         self._assemblies["dashpot"] += 1
-        for side in self._side_forces:
-            side.fasten(*impedance)
+        self.sides.fasten(*impedance)
         dashpots = self._constrain("dashpot", self._K)
         if C is None:
             return dashpots
@@ -409,75 +371,3 @@ class Equations:
         # Hysteretic laws name no frequency: theirs are the same at all.
         frequency = self._scene.solver.reference_frequency or 1.0
         return float(np.real(part.function(2j * np.pi * frequency)))
-
-    def with_sides(self, loads: list[PETSc.Vec] | AffineLoads) -> list[PETSc.Vec] | Loads:
-        """Right-hand sides with the forces from beyond the sides, which differ between lines."""
-        return _SideLoads(self, loads) if self._side_forces else loads
-
-    def add_side_forces(self, line: int, side: int, load: PETSc.Vec) -> None:
-        """Add what comes from beyond the sides to a right-hand side of a line."""
-        self._add_from_sides(lambda force, nodal: force.add_force(line, side, nodal), load)
-
-    def add_side_start(self, derivative: int, load: PETSc.Vec) -> None:
-        """Add what comes from beyond the sides at the start of the lapse, or its rate."""
-        self._add_from_sides(lambda force, nodal: force.add_start(derivative, nodal), load)
-
-    def _add_from_sides(self, add: Callable[[SideForce, PETSc.Vec], None], load: PETSc.Vec) -> None:
-        if not self._side_forces:
-            return
-        nodal = self.T.createVecLeft()
-        for force in self._side_forces:
-            add(force, nodal)
-        self.T.multTransposeAdd(nodal, load, load)
-        nodal.destroy()
-
-    @property
-    def inertia(self) -> list[PETSc.Vec]:
-        """−TᵀM r of each motion [kg], borrowed until the points are weighed again."""
-        return self._inertia
-
-    def accelerate(self, force: PETSc.Vec) -> RealArray:
-        """M⁻¹ f on this rank's unknowns (collective), by conjugate gradients.
-
-        Points weigh a well-conditioned mass as long as each cell has as many as it was seeded with;
-        where cells have lost points M is held by a ghost.
-
-        Args:
-            force: f, such as the momentum SᵀM_p v of the points.
-
-        Returns:
-            Shape ``(num_local_unknowns,)``.
-        """
-        if self._mass_solver is None:
-            self._mass_solver = PETSc.KSP().create(force.comm)
-            self._mass_solver.setOptionsPrefix("hytf_mass_")
-            self._mass_solver.setType(PETSc.KSP.Type.CG)
-            self._mass_solver.getPC().setType(PETSc.PC.Type.JACOBI)
-            self._mass_solver.setTolerances(rtol=_MASS_TOLERANCE, atol=0.0, max_it=_MASS_STEPS)
-        held = self._constrained.get("held mass", self._constrained["mass"])
-        self._mass_solver.setOperators(held)
-        x = force.duplicate()
-        self._mass_solver.solve(force, x)
-        values = x.array_r.real.copy()
-        x.destroy()
-        return values
-
-
-@dataclass(frozen=True)
-class _SideLoads:
-    """Right-hand sides with what comes from beyond the sides; made anew for each line."""
-
-    equations: Equations
-    loads: list[PETSc.Vec] | AffineLoads
-
-    def __len__(self) -> int:
-        return len(self.loads)
-
-    def __call__(self, line: int) -> Sequence[PETSc.Vec]:
-        if isinstance(self.loads, AffineLoads):
-            sides = list(self.loads(line))
-        else:
-            sides = [load.copy() for load in self.loads]
-        for side, load in enumerate(sides):
-            self.equations.add_side_forces(line, side, load)
-        return sides

@@ -135,7 +135,7 @@ class Handover:
         momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
         found = self._equations.unknowns.collect(momentum.ravel())
         # The momentum of the nodes' velocity: that of the points but for what no node can have.
-        self._velocity = self._equations.accelerate(found)
+        self._velocity = self._equations.inertia.accelerate(found)
         self._momentum = product([(self._equations.mass, 1.0)], self._velocity, like=found)
         found.destroy()
         if self._statics is not None and self._segment.index:
@@ -153,7 +153,7 @@ class Handover:
             lasting.axpy(-1.0, self._constant)
         if self._excitation.carries:
             loads = self._loads(material, [lasting, *forces[1:]])
-            sweep = solve(self._equations.with_sides(loads))
+            sweep = solve(self._equations.sides.loads(loads, self._equations.T))
         else:
             sweep = solve(equations.loads)
         start = self._starts(equations, material, forces)
@@ -188,7 +188,7 @@ class Handover:
 
     def _loads(self, material: Material, forces: list[PETSc.Vec]) -> AffineLoads:
         """Right-hand sides: a unit of each motion, and what is carried over or acts all along."""
-        s, inertia = self._excitation.s, self._equations.inertia
+        s, inertia = self._excitation.s, self._equations.inertia.forces
         assert self._momentum is not None
         fades = [-fading(part.relaxation_time, s) for part in material.parts]
         carried = [np.ones_like(s), *fades, -fading(FADING, s)]
@@ -272,10 +272,10 @@ class Handover:
         """What acts at the start, or its rate, less the carried forces and products of matrices."""
         total = forces[0].duplicate()
         total.zeroEntries()
-        self._equations.add_side_start(derivative, total)
+        self._equations.sides.add_start(derivative, total, self._equations.T)
         if self._constant is not None and derivative == 0:
             total.axpy(1.0, self._constant)
-        for inertia, value in zip(self._equations.inertia, motion, strict=True):
+        for inertia, value in zip(self._equations.inertia.forces, motion, strict=True):
             total.axpy(float(value), inertia)
         for force, factor in zip(forces, factors, strict=True):
             total.axpy(-factor, force)

@@ -81,7 +81,7 @@ def handover_energy(
     power, lost = np.zeros((2, len(course.time)))
     if forces.imbalance is not None:
         power += course.linear(forces.imbalance, v)
-    for acceleration, inertia in zip(motion, equations.inertia, strict=True):
+    for acceleration, inertia in zip(motion, equations.inertia.forces, strict=True):
         power += acceleration * course.linear(inertia, v)
     for C in solved.viscous:
         lost += course.quadratic(C, v)
@@ -129,12 +129,12 @@ def _with_slip(
     """Power, loss and kinetic energy with what slips besides w."""
     power, lost, kinetic = of_w
     rate = slip.history.rate[:: slip.substeps]
-    like = equations.inertia[0]
+    like = equations.inertia.forces[0]
     phi = like.duplicate()
     phi.array[:] = slip.unknowns
     M_phi = product([(equations.mass, 1.0)], slip.unknowns, like=like)
     drag = product(solved.drag, slip.unknowns, like=like)
-    for acceleration, inertia in zip(motion, equations.inertia, strict=True):
+    for acceleration, inertia in zip(motion, equations.inertia.forces, strict=True):
         power = power + acceleration * rate * float(phi.dot(inertia).real)
     lost = lost + 2 * rate * course.linear(drag, v) + rate**2 * float(phi.dot(drag).real)
     kinetic = kinetic + rate * course.linear(M_phi, v) + 0.5 * rate**2 * slip.modal_mass

@@ -122,12 +122,12 @@ class Sliding:
     def _next(self, points: Points, state: SlipState) -> Mechanism:
         """The mechanism now, sought from where the last one has moved to."""
         momentum = self._momentum(points)
-        start = self._equations.unknowns.expand(self._equations.accelerate(momentum))
+        start = self._equations.unknowns.expand(self._equations.inertia.accelerate(momentum))
         momentum.destroy()
         return self._find(state.axis, state.sense, start)
 
     def _find(self, axis: int, sense: int, start: RealArray | None = None) -> Mechanism:
-        inertia = self._equations.influence[self._equations.axes.index(axis)]
+        inertia = self._equations.inertia.influence[self._equations.axes.index(axis)]
         return self._slope.find(inertia, sense * self._g, start)
 
     def _momentum(self, points: Points) -> PETSc.Vec:
@@ -175,7 +175,7 @@ class Sliding:
             self.state,
             response,
             equations,
-            self._equations.inertia,
+            self._equations.inertia.forces,
             self._handover.motion_between,
             self._g * self._mechanism.yield_coefficient,
             self._settings.time_step,

@@ -96,7 +96,7 @@ class WholeRecord:
         if not given.carries:
             return driven
         w, rate = (self._momentum_beside(driven, derivative) for derivative in (0, 1))
-        displacement = self._equations.accelerate(w)
+        displacement = self._equations.inertia.accelerate(w)
         damped = product([(C, 1.0) for C in equations.viscous], displacement, like=w)
         s = given.s
         coefficients = np.stack([s, np.ones_like(s), np.ones_like(s)])[:, None]
@@ -119,7 +119,10 @@ class WholeRecord:
         """Coefficients of the start functions of the free vibration, from its two momenta."""
         viscous = [(C, -1.0) for C in equations.viscous]
         stiff = [(K, -share) for K, share in equations.stiff]
-        displacement, velocity = self._equations.accelerate(w), self._equations.accelerate(rate)
+        displacement, velocity = (
+            self._equations.inertia.accelerate(w),
+            self._equations.inertia.accelerate(rate),
+        )
         force = product(stiff, displacement, like=w)
         force.axpy(1.0, slowed := product(viscous, velocity, like=w))
         change = product(stiff, velocity, like=w)

@@ -272,7 +272,7 @@ class Run:
         momentum = self.equations.unknowns.collect(
             (S.T @ (self.points.mass[:, None] * carried)).ravel()
         )
-        field = self.equations.unknowns.expand(self.equations.accelerate(momentum))
+        field = self.equations.unknowns.expand(self.equations.inertia.accelerate(momentum))
         momentum.destroy()
         return field
 

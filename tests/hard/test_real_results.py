@@ -126,7 +126,7 @@ def test_20_matrices_and_loads_are_real(name, tmp_path, figure):
     probe = constrained_rows(lapse.domain, rows, lapse.equations.T)
     found = [entries(matrix) for matrix, _ in lapse.system.terms]
     found += [entries(lapse.equations.T), entries(probe)]
-    found += [vector.array_r for vector in (*lapse.loads, *lapse.equations.influence)]
+    found += [vector.array_r for vector in (*lapse.loads, *lapse.equations.inertia.influence)]
     worst = max(imaginary_share(values) for values in found)
     figure(f"case 20, {name}: imaginary part of matrices and loads", worst, NOTHING)
 
