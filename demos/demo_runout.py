@@ -62,7 +62,8 @@ print(f"mass open by {ledger.imbalance:.0e}; points parked: {ledger.parked}")
 assert abs(open_by) < 0.03 * work
 assert ledger.imbalance < 1e-14
 fill = max(lapse.cells.fill.max() for lapse in result.lapses)
-print(f"the fullest cell holds {fill:.2f} times its volume, counted in points")
+print(f"the fullest cell holds {fill:.2f} times its volume of soil")
+assert fill < 1.1
 
 chosen = [shots[0], shots[len(shots) // 2], shots[-1]]
 figure, rows = plt.subplots(3, 1, figsize=(9, 7.5), layout="constrained", sharex=True, sharey=True)

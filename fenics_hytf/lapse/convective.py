@@ -20,6 +20,7 @@ from fenics_hytf.particles import (
     Points,
     PointsNotFinite,
     PointsOutside,
+    carry_pieces,
     even_shift,
     gradient_matrices,
     move,
@@ -85,11 +86,14 @@ def convect(
             "lame_lambda": constants.lame_lambda[cells],
             "shear_modulus": constants.shear_modulus[cells],
         }
-    displacement = S @ increment
-    if slip is not None:
-        displacement = displacement + S @ slip + even_shift(domain.V, slip, points)
+    displacement, moved = S @ increment, gradient
+    if slip is not None and plastic is not None:
+        shift, of_shift = even_shift(domain.V, slip, points)
+        displacement, moved = displacement + S @ slip + shift, gradient + plastic + of_shift
     if np.isfinite(gradient).all():
         update_kinematics(points, gradient, **moduli, plastic=plastic)
+        if "piece" in points.history:
+            carry_pieces(points, moved)
     try:
         if density is not None:
             _require_volume(domain, points, density)

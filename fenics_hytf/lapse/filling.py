@@ -2,11 +2,12 @@
 """Cells that points fill in part, or not at all: what counts of each, and what has come off.
 
 A cell with points is *filled*; one that has an empty neighbour is at the *edge*. Inside, the points
-of a cell come and go without the ground being any thinner, so a cell there counts whole; at the
-edge it counts as far as its points fill it, and is integrated at the points, stiffness and stress
-alike. A cell at the edge that has lost a part of its points is *loose*: its stiffness may be next
-to nothing, or leave it a mechanism, and a ghost term holds it by its neighbours. Nodes of empty
-cells alone are no unknowns.
+of a cell come and go without the ground being any thinner, so a cell there counts whole, even a
+*gap*: a cell that holds no point, but what points round it stand for. (As a hole it would yield as
+a mechanism of its own.) A cell at the edge counts as far as its points fill it, and is integrated
+at the points, stiffness and stress alike. One that has lost a part of its points is *loose*: its
+stiffness may be next to nothing, or leave it a mechanism, and a ghost term holds it by its
+neighbours. Nodes of empty cells alone are no unknowns.
 
 Filled cells that hang together over facets are a body. One that is not held in every direction in
 which the boundaries hold anything has come off, and what becomes of its points is the scene's
@@ -31,7 +32,7 @@ from fenics_hytf.domain import (
 )
 from fenics_hytf.lapse.errors import DetachedError
 from fenics_hytf.operators import GhostForm, InternalForce, gauss_sites
-from fenics_hytf.particles import Points, take_out
+from fenics_hytf.particles import Points, spread, take_out
 from fenics_hytf.scene import Scene, SceneError, default_kind
 
 RealArray = npt.NDArray[np.float64]
@@ -51,15 +52,19 @@ class Filling:
             ``(num_cells,)``.
         edge: Cells at the edge, shape ``(num_cells,)``.
         share: Volume of the points over that of the cell [-], shape ``(num_cells,)``.
+        spread: The same of their pieces, where they have any; nought in empty cells alone.
+        gap: Cells without a point that pieces fill, shape ``(num_cells,)``.
     """
 
     weight: RealArray
     edge: Cells
     share: RealArray
+    spread: RealArray
+    gap: Cells
 
     @property
     def filled(self) -> Cells:
-        """Cells with points, shape ``(num_cells,)``."""
+        """Cells with points, and gaps, shape ``(num_cells,)``."""
         return self.weight > 0
 
     @property
@@ -106,6 +111,28 @@ class Filling:
         force.occupy(points, self.whole[local], self.edge[local])
 
 
+def cell_integrals(
+    domain: Domain, points: Points, values: RealArray, filling: Filling | None
+) -> RealArray:
+    """Values of points times their volumes, summed in each cell; in gaps of pieces (collective).
+
+    Args:
+        domain: The domain.
+        points: The points.
+        values: Shape ``(len(points), k)``.
+        filling: How far the points fill the cells; ``None`` where no cell may be empty.
+
+    Returns:
+        Of all cells in the order of the input, shape ``(num_cells, k)``.
+    """
+    sums = np.zeros((domain.num_owned_cells, values.shape[1]))
+    np.add.at(sums, points.cell, points.volume[:, None] * values)
+    if filling is not None and filling.gap.any():
+        gap = filling.gap[domain.input_cells[: len(sums)]]
+        sums[gap] = spread(domain.mesh, points, values)[gap]
+    return domain.gather_cells(sums)
+
+
 class FillingSurvey:
     """Looks at how points fill the cells of a mesh that they may leave.
 
@@ -149,11 +176,33 @@ class FillingSurvey:
         if self._policy != "error" and off.any():
             take_out(points, off[self._domain.input_cells[points.cell]], self._policy)
             share = np.where(off, 0.0, share)
-        return self._weigh(share)
+        return self._weigh(share, self._spread(points, share))
 
     def _share(self, points: Points) -> RealArray:
         filled = np.bincount(points.cell, points.volume, self._domain.num_owned_cells)
         return self._domain.gather_cells(filled) / self._volume
+
+    def _spread(self, points: Points, share: RealArray) -> RealArray:
+        if "piece" not in points.history:
+            return share
+        pieces = spread(self._domain.mesh, points, np.ones((len(points), 1)))[:, 0]
+        return self._domain.gather_cells(pieces) / self._volume
+
+    def _gaps(self, counted: Cells, spread: RealArray) -> Cells:
+        """Cells without a point that pieces fill by more than half, away from empty cells."""
+        gap = ~counted & (spread > 0.5)
+        while gap.any():
+            exposed = gap & self._beside_empty(counted | gap)
+            if not exposed.any():
+                break
+            gap &= ~exposed
+        return gap
+
+    def _beside_empty(self, filled: Cells) -> Cells:
+        """Filled cells with an empty neighbour."""
+        beside = np.zeros(len(filled), bool)
+        beside[self._pairs[filled[self._pairs].sum(axis=1) == 1]] = True
+        return beside & filled
 
     def _bodies(self, filled: Cells) -> npt.NDArray[np.int32]:
         """Number of the body that each cell belongs to, -1 for an empty one."""
@@ -163,14 +212,14 @@ class FillingSurvey:
         _, number = sparse.csgraph.connected_components(links, directed=False)
         return np.where(filled, number, -1)
 
-    def _weigh(self, share: RealArray) -> Filling:
-        filled = share > 0
-        edge = np.zeros(len(share), bool)
-        mixed = self._pairs[filled[self._pairs].sum(axis=1) == 1]
-        edge[mixed] = True
-        edge &= filled
+    def _weigh(self, share: RealArray, spread: RealArray) -> Filling:
+        gap = self._gaps(share > 0, spread)
+        filled = gap | (share > 0)
+        edge = self._beside_empty(filled)
         weight = np.where(edge, np.minimum(share, 1.0), filled.astype(float))
-        return Filling(weight, edge, share)
+        # A long piece may leave next to nothing in the very cell of its point.
+        spread = np.where(filled, np.maximum(spread, np.finfo(float).eps), 0.0)
+        return Filling(weight, edge, share, spread, gap)
 
 
 def _held_axes(domain: Domain, name: str, kind: str) -> tuple[int, ...]:

@@ -17,8 +17,8 @@ import numpy.typing as npt
 
 from fenics_hytf.domain import Domain, distance_to_sides
 from fenics_hytf.lapse.errors import EmptyCellError
-from fenics_hytf.lapse.filling import Filling
-from fenics_hytf.particles import Points, seed
+from fenics_hytf.lapse.filling import Filling, cell_integrals
+from fenics_hytf.particles import Points, first_pieces, seed
 from fenics_hytf.scene import Scene
 from fenics_hytf.soil import Curve
 
@@ -135,6 +135,10 @@ def seed_points(
             points.add(name, shape)
     if scene.effects.softening:
         points["softest"][...] = 1.0
+    if scene.mesh.empty and scene.effects.convection:
+        gdim = domain.gdim
+        points.add("piece", (gdim, gdim + 1))
+        points["piece"] = first_pieces(domain.mesh, points, count)
     return points
 
 
@@ -161,10 +165,7 @@ def survey(scene: Scene, domain: Domain, points: Points, filling: Filling | None
             for s in soils
         ]
     )
-    owned = domain.num_owned_cells
-    mine = np.zeros((owned, len(soils)))
-    np.add.at(mine, (points.cell, points.region), points.volume)
-    share = domain.gather_cells(mine)
+    share = cell_integrals(domain, points, np.eye(len(soils))[points.region], filling)
     volume = share.sum(axis=1)
     if filling is None and not volume.all():
         raise EmptyCellError([int(cell) for cell in np.flatnonzero(volume == 0)])

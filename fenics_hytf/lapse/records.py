@@ -39,8 +39,9 @@ class CellState:
             shape ``(num_cells,)``.
         degradation: What counted cycles have left of the modulus in the lapse [-], shape
             ``(num_cells,)``; ``None`` where nothing degrades.
-        fill: Volume of the points over that of the cell [-], shape ``(num_cells,)``; ``None`` where
-            all cells are full. An empty cell has no state.
+        fill: Volume of the soil in the cell over that of the cell [-], each point's spread over its
+            piece, shape ``(num_cells,)``; ``None`` where all cells are full. An empty cell has no
+            state.
     """
 
     region: npt.NDArray[np.int32]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
-from fenics_hytf.lapse.filling import Filling
+from fenics_hytf.lapse.filling import Filling, cell_integrals
 from fenics_hytf.lapse.mechanism import Mechanism, MechanismSearch
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.particles import Points, to_tensor
@@ -87,18 +87,17 @@ class Slope:
         """
         local = self._domain.input_cells
         self._weight = np.ones(len(local)) if filling is None else filling.weight[local]
-        self._strength = self._cell_strength(points)[local]
+        self._strength = self._cell_strength(points, filling)[local]
         self._forget()
         self._gravity = self._statics.unknowns.collect(self._statics.weight_of(points))
 
-    def _cell_strength(self, points: Points) -> RealArray:
+    def _cell_strength(self, points: Points, filling: Filling | None) -> RealArray:
         """Mean shear strength of every cell by volume [Pa]; 1 where there is no soil."""
         pressure = mean_pressure(points["stress"])
         cohesion = self._cohesion[points.region]
         strength = shear_strength(cohesion, self._friction_angle[points.region], pressure)
-        sums, one = np.zeros((self._domain.num_owned_cells, 2)), np.ones(len(points))
-        np.add.at(sums, points.cell, points.volume[:, None] * np.stack([one, strength], axis=1))
-        volume, total = self._domain.gather_cells(sums).T
+        both = np.column_stack([np.ones(len(points)), strength])
+        volume, total = cell_integrals(self._domain, points, both, filling).T
         mean = total / np.where(volume > 0, volume, 1.0)
         return np.where(volume > 0, np.maximum(mean, _LEAST_STRENGTH * mean.max()), 1.0)
 

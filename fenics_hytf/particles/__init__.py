@@ -23,6 +23,7 @@ from fenics_hytf.particles.move import (
     move,
     take_out,
 )
+from fenics_hytf.particles.pieces import carry_pieces, first_pieces, spread
 from fenics_hytf.particles.points import Points, quadrature_rule, seed
 from fenics_hytf.particles.resample import resample_matrix
 from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
@@ -44,10 +45,12 @@ __all__ = [
     "PointsNotFinite",
     "PointsOutside",
     "Sites",
+    "carry_pieces",
     "cell_centres",
     "cell_grid",
     "default_points_per_cell",
     "even_shift",
+    "first_pieces",
     "gather_points",
     "gradient_matrices",
     "inverse_map",
@@ -59,6 +62,7 @@ __all__ = [
     "resolve_owners",
     "scatter_points",
     "seed",
+    "spread",
     "take_out",
     "to_components",
     "to_tensor",

@@ -25,8 +25,10 @@ from fenics_hytf.particles.transfer import gradient_matrices
 RealArray = npt.NDArray[np.float64]
 
 
-def even_shift(V: fem.FunctionSpace, flow: RealArray, points: Points) -> RealArray:
-    """The shift δ of points that ride a flow.
+def even_shift(
+    V: fem.FunctionSpace, flow: RealArray, points: Points
+) -> tuple[RealArray, RealArray]:
+    """The shift δ of points that ride a flow, and its gradient.
 
     Args:
         V: Space of the flow.
@@ -34,21 +36,24 @@ def even_shift(V: fem.FunctionSpace, flow: RealArray, points: Points) -> RealArr
         points: The points.
 
     Returns:
-        [m], shape ``(len(points), gdim)``; nought in cells other than linear quadrilaterals and
+        δ [m], shape ``(len(points), gdim)``, and ∂δ_i/∂x_j [-], shape
+        ``(len(points), gdim, gdim)``; nought in cells other than linear quadrilaterals and
         hexahedra.
     """
     mesh, gdim = V.mesh, V.mesh.geometry.dim
+    shift, gradient = np.zeros((len(points), gdim)), np.zeros((len(points), gdim, gdim))
     linear = V.ufl_element().degree == 1
     if not linear or mesh.topology.cell_name() not in ("quadrilateral", "hexahedron"):
-        return np.zeros_like(points.x)
+        return shift, gradient
     cells, number = np.unique(points.cell, return_inverse=True)
     slopes = np.stack([_rise(V, flow, cells, axis) for axis in range(gdim)], axis=1)
-    shift = np.empty_like(points.x)
     for chunk in chunks(len(points)):
-        X = points.X[chunk]
-        along = 0.5 * slopes[number[chunk]] * X * (1 - X)
-        shift[chunk] = np.einsum("pij,pj->pi", jacobians(mesh, points.cell[chunk], X), along)
-    return shift
+        X, rise = points.X[chunk], 0.5 * slopes[number[chunk]]
+        J = jacobians(mesh, points.cell[chunk], X)
+        shift[chunk] = np.einsum("pij,pj->pi", J, rise * X * (1 - X))
+        along = rise * (1 - 2 * X)
+        gradient[chunk] = np.einsum("pij,pj,pjk->pik", J, along, np.linalg.inv(J))
+    return shift, gradient
 
 
 def _rise(

@@ -80,7 +80,8 @@ def move(
     cell_search(mesh)
     cells[moved], X[moved] = locate(mesh, x[moved], points.cell[moved])
     lost = np.flatnonzero(cells < 0)
-    owner, claimed, claimed_X = _find_elsewhere(mesh, x[lost])
+    owner, claimed, claimed_X, own = show_to_all(mesh, x[lost])
+    mine, owner = owner == comm.rank, owner[own]
     gone, leaving = lost[owner < 0], lost[owner >= 0]
     if outside == "error":
         agree_on_points(
@@ -100,7 +101,7 @@ def move(
     }
     _book(points, take(arrays, gone), outside)
     arrived = _exchange(comm, take(arrays, leaving), owner[owner >= 0])
-    arrived |= {"cell": claimed, "X": claimed_X}
+    arrived |= {"cell": claimed[mine], "X": claimed_X[mine]}
     points.assign(join([take(arrays, cells >= 0), arrived]))
     points.sort(mesh)
     ledger = points.ledger(comm, leaving.size)
@@ -180,17 +181,19 @@ def _check(comm: MPI.Comm, points: Points, displacement: RealArray, outside: str
     )
 
 
-def _find_elsewhere(mesh: Mesh, x: RealArray) -> tuple[IntArray, IntArray, RealArray]:
-    """Find the owners of points that their own ranks do not find (collective).
+def show_to_all(
+    mesh: Mesh, x: RealArray
+) -> tuple[npt.NDArray[np.int32], IntArray, RealArray, slice]:
+    """Find the owners of places that their own ranks do not find (collective).
 
     Args:
         mesh: Mesh.
-        x: The points this rank has lost [m], shape ``(n, gdim)``.
+        x: Places that this rank has lost [m], shape ``(n, gdim)``.
 
     Returns:
-        The rank that owns each of them, -1 if none does, shape ``(n,)``; and of all points lost
-        anywhere, in the order of the ranks that lost them, those that this rank owns: local cells,
-        shape ``(m,)``, and reference coordinates, shape ``(m, tdim)``.
+        Of the places that any rank has lost, in the order of the ranks: the rank that owns each,
+        -1 if none does, shape ``(m,)``; the local cell and the reference coordinates of those that
+        this rank owns, shapes ``(m,)`` and ``(m, tdim)``; and which of them are this rank's.
     """
     comm = mesh.comm
     shares = comm.allgather(x)
@@ -200,8 +203,7 @@ def _find_elsewhere(mesh: Mesh, x: RealArray) -> tuple[IntArray, IntArray, RealA
     candidates[cells >= 0] = index[cells[cells >= 0]]
     _, owner = resolve_owners(comm, candidates)
     start = sum(len(share) for share in shares[: comm.rank])
-    mine = owner == comm.rank
-    return owner[start : start + len(x)], cells[mine], X[mine]
+    return owner, cells, X, slice(start, start + len(x))
 
 
 def _exchange(comm: MPI.Comm, arrays: Arrays, destination: IntArray) -> Arrays:

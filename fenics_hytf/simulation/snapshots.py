@@ -16,7 +16,7 @@ from fenics_hytf.particles import Points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.records import Snapshot
 
-_INTERNAL = ("X", "memory_strain")
+_INTERNAL = ("X", "memory_strain", "piece")
 
 _MESHIO = {
     "triangle": "triangle",

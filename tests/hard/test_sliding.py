@@ -15,6 +15,7 @@ from support.sliding import GRAVITY, column, in_file, open_energy, sine, slope, 
 
 import fenics_hytf.simulation.run as steps
 from fenics_hytf.motion import Segment
+from fenics_hytf.particles import move
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import Result, simulate
 
@@ -157,3 +158,32 @@ def test_33_a_short_lapse(short, figure):
     )
     off = np.abs(found - expected).max() / np.abs(expected).max()
     figure(f"case 33, a lapse of {short} samples: displacement", off, 2e-4)
+
+
+# ---------------------------------------------------------------- cells
+
+
+def test_33_a_cell_without_a_point_is_no_hole(monkeypatch, figure):
+    """Its neighbours would fall into it, as a mechanism of its own, and end all other motion."""
+
+    data = slope(convection=True, lapses=2)
+    data["motion"][0]["harmonic"]["amplitude"] = 0.01
+    whole = simulate(Scene.from_dict(data)).lapses[1]
+    convect = steps.convect
+
+    def left(domain, points, *arguments):
+        report = convect(domain, points, *arguments)
+        away = points.x - [8.5, 2.5]  # in the slip surface
+        inside = np.abs(away).max(axis=1) < 0.5
+        way = np.where(inside[:, None], 0.4 * np.sign(away), 0.0) * [1, 0]
+        points["piece"][:, :, 2] -= way  # the soil stays
+        move(domain.mesh, points, way)
+        return report
+
+    monkeypatch.setattr(steps, "convect", left)
+    gap = simulate(Scene.from_dict(data)).lapses[1]
+    off = abs(gap.slip.yield_coefficient / whole.slip.yield_coefficient - 1)
+    # What the points weigh is elsewhere by 0.4 m, of one cell in some 30 that slip. With a hole
+    # there k_y falls by 11 %.
+    figure("case 33, a cell without a point: k_y", off, 0.01)
+    assert gap.cells.fill.max() < 1.01

@@ -88,6 +88,20 @@ def counted(points, comm) -> dict[str, np.ndarray]:
     return {"share": share.ravel(), "filled": filled.ravel(), "edge": edge.ravel()}
 
 
+def emptied(case, middle, comm=WORLD):
+    """Level ground, a cell's points moved to its neighbours, and its soil left where it was."""
+    domain = build(case, comm)
+    points = seed_points(case, domain)
+    away = points.x - middle
+    inside = np.abs(away).max(axis=1) < 0.5
+    way = np.where(inside[:, None], 0.4 * np.sign(away), 0.0) * [1, 0]
+    points["piece"][:, :, 2] -= way
+    move(domain.mesh, points, way)
+    return SimpleNamespace(
+        domain=domain, points=points, filling=FillingSurvey(case, domain)(points)
+    )
+
+
 # ---------------------------------------------------------------- filling
 
 
@@ -101,6 +115,37 @@ def test_level_ground_is_whole_but_for_its_surface():
     np.testing.assert_allclose(filling.share, (rows < 5).astype(float), rtol=1e-15)
     np.testing.assert_allclose(filling.weight, filling.share, rtol=1e-15)
     assert not filling.loose.any()
+
+
+@pytest.mark.mpi
+def test_a_cell_without_a_point_is_a_gap_where_soil_fills_it():
+    found = emptied(section(), [5.5, 2.5]).filling
+    cells = np.arange(WIDTH * HEIGHT)
+    np.testing.assert_array_equal(found.gap, cells == 2 * WIDTH + 5)
+    assert found.share[found.gap] == 0 and found.whole[found.gap]
+    np.testing.assert_array_equal(found.edge, cells // WIDTH == 4)
+    np.testing.assert_array_equal(found.filled, cells // WIDTH < 5)
+    np.testing.assert_allclose(found.spread, found.filled.astype(float), atol=1e-13)
+
+
+@pytest.mark.mpi
+def test_there_is_no_gap_at_the_surface():
+    found = emptied(section(), [5.5, 4.5]).filling
+    assert not found.gap.any() and not found.filled[4 * WIDTH + 5]
+
+
+@pytest.mark.mpi
+def test_a_gap_has_the_soil_that_fills_it():
+    both = [{"soil": "sand", "below": 2.0}, *LEVEL]
+    grid = {"box": {"size": [12.0, 8.0], "cells": [WIDTH, HEIGHT]}, "regions": both}
+    soils = {"boundary": TIED, "effects": {"convection": True}}
+    case = scene(grid | {"empty": ["air"]}, ("sand", "clay"), **soils)
+    for height, soil in ((1.5, "sand"), (2.5, "clay")):
+        found = emptied(case, [5.5, height])
+        ground = survey(case, found.domain, found.points, found.filling)
+        gap = np.flatnonzero(found.filling.gap)
+        assert found.domain.region_names[ground.region[gap[0]]] == soil
+        assert ground.shear_modulus[gap[0]] == case.soil[soil].elastic.shear_modulus
 
 
 @pytest.mark.mpi
