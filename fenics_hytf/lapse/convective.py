@@ -7,6 +7,7 @@ stays where it was. Under ``steady`` continuity a lapse is periodic and the net 
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -31,6 +32,7 @@ from fenics_hytf.particles import (
 
 RealArray = npt.NDArray[np.float64]
 
+_STRIDE = 0.1  # of a cell: points ride what slips in steps of no more
 _LEAST_VOLUME = 0.1  # of a point over that at the start; its inverse is the most
 
 
@@ -73,34 +75,65 @@ def convect(
     """
     before = points.arrays() | {name: old.copy() for name, old in points.history.items()}
     S = transfer_matrix(points, domain.V)
-    gradients = gradient_matrices(points, domain.V)
-    gradient = np.stack([dS @ increment for dS in gradients], axis=2)
-    plastic = None if slip is None else np.stack([dS @ slip for dS in gradients], axis=2)
     for name, field in (("velocity", velocity), ("acceleration", acceleration)):
         if field is not None and name in points.history:
             points[name] = S @ field
-    moduli: dict[str, npt.ArrayLike] = {"lame_lambda": 0.0, "shear_modulus": 0.0}
-    if constants is not None and "dynamic_stress" not in points.history:
-        cells = domain.input_cells[points.cell]
-        moduli = {
-            "lame_lambda": constants.lame_lambda[cells],
-            "shear_modulus": constants.shear_modulus[cells],
-        }
-    displacement, moved = S @ increment, gradient
-    if slip is not None and plastic is not None:
-        shift, of_shift = even_shift(domain.V, slip, points)
-        displacement, moved = displacement + S @ slip + shift, gradient + plastic + of_shift
-    if np.isfinite(gradient).all():
-        update_kinematics(points, gradient, **moduli, plastic=plastic)
-        if "piece" in points.history:
-            carry_pieces(points, moved)
+    if "dynamic_stress" in points.history:
+        constants = None
+    strides = 1 if slip is None else _strides(domain, slip)
+    slip = None if slip is None else slip / strides
+    reports = []
     try:
-        if density is not None:
-            _require_volume(domain, points, density)
-        return move(domain.mesh, points, displacement, outside)
+        for _ in range(strides):
+            displacement = _ride(domain, points, increment / strides, slip, constants)
+            if density is not None:
+                _require_volume(domain, points, density)
+            reports.append(move(domain.mesh, points, displacement, outside))
     except (PointsOutside, PointsNotFinite, VolumeError):
         points.assign(before)
         raise
+    migrated = sum(report.ledger.migrated for report in reports)
+    mapped = sum(report.inverse_mappings for report in reports)
+    return MoveReport(replace(reports[-1].ledger, migrated=migrated), mapped)
+
+
+def _strides(domain: Domain, slip: RealArray) -> int:
+    """Steps to ride a flow in (collective): in one, what turns would spread, and thin out."""
+    longest = float(np.linalg.norm(slip, axis=1).max(initial=0.0))
+    smallest = float(domain.cell_sizes().min(initial=np.inf))
+    shares = domain.comm.allgather((longest, smallest))
+    way, size = max(share[0] for share in shares), min(share[1] for share in shares)
+    return max(1, int(np.ceil(way / (_STRIDE * size) - 1e-9)))
+
+
+def _ride(
+    domain: Domain,
+    points: Points,
+    increment: RealArray,
+    slip: RealArray | None,
+    constants: ElasticConstants | None,
+) -> RealArray:
+    """What points carry follows an increment; the displacement by which they are to move."""
+    S = transfer_matrix(points, domain.V)
+    gradients = gradient_matrices(points, domain.V)
+    gradient = np.stack([dS @ increment for dS in gradients], axis=2)
+    displacement, moved, plastic = S @ increment, gradient, None
+    if slip is not None:
+        plastic = np.stack([dS @ slip for dS in gradients], axis=2)
+        shift, of_shift = even_shift(domain.V, slip, points)
+        displacement, moved = displacement + S @ slip + shift, gradient + plastic + of_shift
+    if np.isfinite(gradient).all():
+        moduli: dict[str, npt.ArrayLike] = {"lame_lambda": 0.0, "shear_modulus": 0.0}
+        if constants is not None:
+            cells = domain.input_cells[points.cell]
+            moduli = {
+                "lame_lambda": constants.lame_lambda[cells],
+                "shear_modulus": constants.shear_modulus[cells],
+            }
+        update_kinematics(points, gradient, **moduli, plastic=plastic)
+        if "piece" in points.history:
+            carry_pieces(points, moved)
+    return np.asarray(displacement)
 
 
 def _require_volume(domain: Domain, points: Points, density: RealArray) -> None:
