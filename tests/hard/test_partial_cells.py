@@ -60,7 +60,8 @@ class HeldEverywhere(Filling):
 
 
 def as_kind(filling: Filling, kind: type[Filling], **options) -> Filling:
-    return kind(filling.weight, filling.edge, filling.share, **options)
+    given = (filling.weight, filling.edge, filling.share, filling.spread, filling.gap)
+    return kind(*given, **options)
 
 
 def section(
