@@ -49,9 +49,9 @@ ComplexArray = npt.NDArray[np.complex128]
 Kernel = Callable[[AffineLoads, ComplexArray, float], Sweep]
 
 # Residual of the kernel's sweep. The quadrature makes ten thousand times as much of an error of P,
-# which is of the second order in the residual: with 1e-5 slip was 5e-9 apart between numbers of
-# groups that share out the sweep, with 1e-8 it is 2e-14, for as many factorisations.
-_KERNEL = 1e-6
+# which is of the second order in the residual: slip is off by less than 1e-9, between numbers of
+# groups that share out the sweep as well (with 1e-5 it was 5e-9).
+_KERNEL = 3e-6
 _ROLL_OFF = 0.5  # of the highest line, from where on less and less of λ̈ excites vibration
 _LEAST = 4  # samples of a lapse, however fast it slips
 
