@@ -14,6 +14,7 @@ edges and the way from the point to its middle, the columns of a matrix P,
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +81,8 @@ def carry_pieces(points: Points, gradient: RealArray) -> None:
 def spread(mesh: Mesh, points: Points, values: RealArray) -> RealArray:
     """Integrals over cells of what pieces bring into them (collective).
 
-    The parts of a piece that lie outside the mesh count to the cell of its point.
+    A piece with all its corners in the cell of its point lies there; others are counted in parts,
+    those of them that lie outside the mesh to the cell of the point.
 
     Args:
         mesh: The mesh.
@@ -93,7 +95,9 @@ def spread(mesh: Mesh, points: Points, values: RealArray) -> RealArray:
     cell_search(mesh)
     total = np.zeros((mesh.topology.index_map(mesh.topology.dim).size_local, values.shape[1]))
     strays = []
-    for x, amount, home in _parts(points, values):
+    whole = _within(mesh, points)
+    np.add.at(total, points.cell[whole], points.volume[whole, None] * values[whole])
+    for x, amount, home in _parts(points, values, np.flatnonzero(~whole)):
         cells, _ = locate(mesh, x, home)
         found = cells >= 0
         np.add.at(total, cells[found], amount[found])
@@ -107,18 +111,37 @@ def spread(mesh: Mesh, points: Points, values: RealArray) -> RealArray:
     return total
 
 
-def _parts(points: Points, values: RealArray) -> Iterator[tuple[RealArray, RealArray, IntArray]]:
-    """Middles of parts of equal volume, value times volume, and the cells of their points."""
+def _within(mesh: Mesh, points: Points) -> npt.NDArray[np.bool_]:
+    """Which pieces have all their corners in the cell of their point."""
     gdim = points.x.shape[1]
-    places = np.column_stack([_evenly(_PARTS, gdim) - 0.5, np.ones(_PARTS)])
-    for chunk in chunks(max(len(points), 1)):
-        x = points.x[chunk, None] + np.einsum("pij,sj->psi", points["piece"][chunk], places)
-        amount = points.volume[chunk, None] / _PARTS * values[chunk]
-        yield (
-            x.reshape(-1, gdim),
-            np.repeat(amount, _PARTS, axis=0),
-            np.repeat(points.cell[chunk], _PARTS),
-        )
+    corners = np.array(list(product((-0.5, 0.5), repeat=gdim)))
+    whole = np.zeros(len(points), bool)
+    for chunk in chunks(len(points)):
+        x, home = _places(points, np.arange(len(points))[chunk], corners)
+        cells, _ = locate(mesh, x, home)
+        whole[chunk] = (cells == home).reshape(-1, len(corners)).all(axis=1)
+    return whole
+
+
+def _parts(
+    points: Points, values: RealArray, some: npt.NDArray[np.intp]
+) -> Iterator[tuple[RealArray, RealArray, IntArray]]:
+    """Middles of parts of equal volume, value times volume, and the cells of their points."""
+    evenly = _evenly(_PARTS, points.x.shape[1]) - 0.5
+    for chunk in chunks(max(len(some), 1)):
+        which = some[chunk]
+        amount = points.volume[which, None] / _PARTS * values[which]
+        x, home = _places(points, which, evenly)
+        yield x, np.repeat(amount, _PARTS, axis=0), home
+
+
+def _places(
+    points: Points, some: npt.NDArray[np.intp], within: RealArray
+) -> tuple[RealArray, IntArray]:
+    """Places in the pieces of some points, one piece after the other, and their points' cells."""
+    places = np.column_stack([within, np.ones(len(within))])
+    x = points.x[some, None] + np.einsum("pij,sj->psi", points["piece"][some], places)
+    return x.reshape(-1, within.shape[1]), np.repeat(points.cell[some], len(within))
 
 
 def _evenly(count: int, dim: int) -> npt.NDArray[np.float64]:
