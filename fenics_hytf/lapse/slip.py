@@ -11,9 +11,10 @@ The force that drives the mechanism is Q(t) = Q_lin(t) − (P * λ̈)(t),
 
 with w₀ the response without slip in this lapse, and λ̇₀ the rate that it begins with, whose constant
 load −Cφ λ̇₀ is among what w₀ answers to. The mechanism slips whenever Q would exceed
-Q_y = φᵀM r g k_y. The kernel P comes by convolution quadrature from one more sweep, and so does the
-part of w that slip excites, −A⁻¹(M φ + C φ/s) λ̈(s). Of C only dashpots and the part that goes with
-the mass are felt by slip; what goes with the stiffness is stress, and that is w's.
+Q_y = φᵀM r g k_y. The kernel P comes by convolution quadrature from a sweep over few of its lines,
+and the part of w that slip excites, −A⁻¹(M φ + C φ/s) λ̈(s), from one over the lines of the lapse,
+which begins with the directions of the other. Of C only dashpots and the part that goes with the
+mass are felt by slip; what goes with the stiffness is stress, and that is w's.
 """
 
 from __future__ import annotations
