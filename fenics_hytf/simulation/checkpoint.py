@@ -31,7 +31,7 @@ from fenics_hytf.scene import Fault, Scene, SceneError, changed_keys, identity
 from fenics_hytf.simulation.errors import CheckpointError
 from fenics_hytf.simulation.packing import Arrays, pack, unpack
 
-FORMAT = 1
+FORMAT = 2
 """Raised when a checkpoint of before can no longer be read."""
 
 FILE = "state.npz"

@@ -31,7 +31,7 @@ from fenics_hytf.simulation.checkpoint import (
 from tests.unit.results_builder import make_result, make_scene
 
 WORLD = MPI.COMM_WORLD
-META = {"format": 1, "lapse": 4, "state": {"x": {"array": "points/x"}}, "names": ["ä", None, 0.1]}
+META = {"format": 2, "lapse": 4, "state": {"x": {"array": "points/x"}}, "names": ["ä", None, 0.1]}
 ARRAYS = {
     "points/x": np.array([[0.1, np.nan], [-0.0, 5e-324]]),
     "points/id": np.arange(3),
@@ -140,8 +140,8 @@ def test_nothing_in_it_is_executed(tmp_path, monkeypatch):
         (sealed(b"no archive" + 64 * b"0"), "found no checkpoint"),
         (archive({"other.json": "{}"}), "found no checkpoint"),
         (archive({"meta.json": "{"}), "found no checkpoint"),
-        (archive({"meta.json": "[]"}), "of format None; expected 1"),
-        (archive({"meta.json": '{"format": 2}'}), "of format 2; expected 1"),
+        (archive({"meta.json": "[]"}), "of format None; expected 2"),
+        (archive({"meta.json": '{"format": 1}'}), "of format 1; expected 2"),
         (archive({"meta.json": json.dumps(META), "x.npy": b"x"}), "found no checkpoint"),
     ],
 )
@@ -201,13 +201,13 @@ from fenics_hytf.simulation import CheckpointError
 from fenics_hytf.simulation.checkpoint import read_checkpoint, write_checkpoint
 folder = Path(sys.argv[1])
 arrays = {f"a{i}": np.full(20_000, float(i)) for i in range(4)}
-write_checkpoint(folder, {"format": 1, "lapse": 0}, {})
+write_checkpoint(folder, {"format": 2, "lapse": 0}, {})
 size = 4 * (20_000 * 8 + 300)
 said = set()
 for limit in [0, 1, 100, 1000, *range(5000, size, 40_000), size - 500]:
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     try:
-        write_checkpoint(folder, {"format": 1, "lapse": 1}, arrays)
+        write_checkpoint(folder, {"format": 2, "lapse": 1}, arrays)
     except CheckpointError as error:
         said.add(str(error))
     else:
@@ -216,7 +216,7 @@ for limit in [0, 1, 100, 1000, *range(5000, size, 40_000), size - 500]:
     assert found is not None and found.meta["lapse"] == 0
     assert [p.name for p in folder.iterdir()] == ["state.npz"]
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-write_checkpoint(folder, {"format": 1, "lapse": 1}, arrays)
+write_checkpoint(folder, {"format": 2, "lapse": 1}, arrays)
 assert read_checkpoint(folder).meta["lapse"] == 1
 print(json.dumps(sorted(said)))
 """
@@ -245,7 +245,7 @@ random.seed(3)
 
 def write(number):
     arrays = {name: np.full(250_000, float(number)) for name in "abcd"}
-    write_checkpoint(folder, {"format": 1, "lapse": number, "padding": number * "x"}, arrays)
+    write_checkpoint(folder, {"format": 2, "lapse": number, "padding": number * "x"}, arrays)
 
 write(0)
 last, torn, replaced = 0, 0, 0

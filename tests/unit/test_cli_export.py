@@ -12,6 +12,7 @@ import pytest
 
 from fenics_hytf.motion import read, read_csv
 from fenics_hytf.results import open_result, read_table
+from fenics_hytf.results.summary import FORMAT
 from tests.unit.results_builder import make_result
 
 
@@ -159,9 +160,9 @@ def test_files_that_are_there_need_force(here, hytf):
 def test_an_older_result_is_refused(here, hytf):
     store()
     path = Path("r/summary.json")
-    path.write_text(path.read_text().replace('"format": 4', '"format": 3'))
+    path.write_text(path.read_text().replace(f'"format": {FORMAT}', f'"format": {FORMAT - 1}'))
     code, _, err = hytf("r")
-    assert code == 2 and "of format 3, this version reads 4" in err
+    assert code == 2 and f"of format {FORMAT - 1}, this version reads {FORMAT}" in err
     assert not Path("r-motions").exists()
 
 
