@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One lapse: the ground, its equations, the equivalent-linear loop, the response, convection."""
+"""One lapse: ground, equations, the equivalent-linear loop, response, what slips, convection."""
 
 from fenics_hytf.lapse.base import BaseProbe, outcrop_motion, within_motion
 from fenics_hytf.lapse.cells import CarriedCells, CellPeaks, CellProbe

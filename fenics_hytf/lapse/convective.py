@@ -3,6 +3,8 @@
 
 Points take the increment Δu = S(u(t_end) − u(t_start)) of the lapse with its gradient; the mesh
 stays where it was. Under ``steady`` continuity a lapse is periodic and the net increment is zero.
+What has slipped they ride in short steps, on a field that is as even as the cells allow, and the
+pieces of soil that they stand for ride along.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy.typing as npt
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.errors import VolumeError
+from fenics_hytf.lapse.filling import cell_integrals
 from fenics_hytf.lapse.material import ElasticConstants
 from fenics_hytf.particles import (
     MoveReport,
@@ -157,9 +160,7 @@ def cell_stress(domain: Domain, points: Points) -> RealArray:
         Cauchy stress [Pa], ghosts included, nought where there is none, shape
         ``(num_local_cells, gdim, gdim)``.
     """
-    weighted = np.column_stack([points.volume, points.volume[:, None] * points["stress"]])
-    sums = np.zeros((domain.num_owned_cells, weighted.shape[1]))
-    np.add.at(sums, points.cell, weighted)
-    everyone = domain.gather_cells(sums)[domain.input_cells]
+    values = np.column_stack([np.ones(len(points)), points["stress"]])
+    everyone = cell_integrals(domain, points, values, None)[domain.input_cells]
     volume = np.where(everyone[:, :1] > 0, everyone[:, :1], 1.0)
     return to_tensor(everyone[:, 1:] / volume)

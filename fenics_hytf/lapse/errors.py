@@ -26,6 +26,16 @@ class EquivalentLinearError(LapseError):
         )
 
 
+class SlipMarchError(LapseError):
+    """The march of what slips has failed."""
+
+    def __init__(self, found: str) -> None:
+        super().__init__(
+            f"march of the slip: {found}. The ground answers slip as none does that only takes "
+            "energy: try a shorter effects.sliding.time_step or a smaller solver.tolerance"
+        )
+
+
 class EmptyCellError(LapseError):
     """The points have left a cell without any where the scene does not reckon with it.
 

@@ -7,7 +7,9 @@ of a cell come and go without the ground being any thinner, so a cell there coun
 a mechanism of its own.) A cell at the edge counts as far as its points fill it, and is integrated
 at the points, stiffness and stress alike. One that has lost a part of its points is *loose*: its
 stiffness may be next to nothing, or leave it a mechanism, and a ghost term holds it by its
-neighbours. Nodes of empty cells alone are no unknowns.
+neighbours. Nodes of empty cells alone are no unknowns. Edge cells are weighed, and found loose, by
+the volumes of the points in them, for over these M, K and forces are summed; gaps, and the fill
+that results tell, are those of the pieces of soil that points stand for.
 
 Filled cells that hang together over facets are a body. One that is not held in every direction in
 which the boundaries hold anything has come off, and what becomes of its points is the scene's

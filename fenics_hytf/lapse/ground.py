@@ -2,8 +2,9 @@
 """The ground of one lapse: what soil the points have brought into each cell, and its stiffness.
 
 A cell takes the mean of the small-strain constants of the points in it, by volume, and the curves
-of the soil that fills most of it. All arrays hold every cell of the mesh in the order of the
-input, so that a run on several ranks adds in the same order as a serial one.
+of the soil that fills most of it; a gap takes them from the points whose soil reaches into it. All
+arrays hold every cell of the mesh in the order of the input, so that a run on several ranks adds in
+the same order as a serial one.
 """
 
 from __future__ import annotations

@@ -88,8 +88,9 @@ class SlipResult:
         slip: λ from the start of the lapse to its end [m], shape ``(num_steps,)``.
         rate: λ̇ [m/s], likewise.
         driving: Acceleration of the linear response that drives the mechanism [m/s^2], likewise.
-        rigid: Slip of Newmark's rigid block in the lapse [m].
-        decoupled: Slip of a rigid block under ``driving`` [m].
+        rigid: What Newmark's rigid block slips in the lapse, times φᵀM r/φᵀMφ to be compared with
+            λ [m].
+        decoupled: Likewise of a rigid block under ``driving`` [m].
         mass: φᵀM r, what the mechanism carries [kg, in 2D kg/m].
         modal_mass: φᵀMφ [kg, in 2D kg/m].
         dissipation: ∫τ_f γ(φ) dV, what a metre of slip costs [N, in 2D N/m].

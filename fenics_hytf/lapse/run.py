@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""One lapse: sweeps with given moduli, and the equivalent-linear loop round them."""
+"""One lapse: sweeps with given moduli, the equivalent-linear loop round them, and what slips."""
 
 from __future__ import annotations
 

@@ -30,6 +30,7 @@ from scipy import fft
 from fenics_hytf.frequency import AffineLoads, Columns, JoinedSweep, Sweep
 from fenics_hytf.lapse.continuity import Solve
 from fenics_hytf.lapse.equations import LapseEquations
+from fenics_hytf.lapse.errors import SlipMarchError
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.mechanism import Mechanism
 from fenics_hytf.lapse.response import Response
@@ -37,6 +38,7 @@ from fenics_hytf.lapse.slipped import Slipped, SlipState
 from fenics_hytf.lapse.starts import product
 from fenics_hytf.motion import (
     ConvolutionQuadrature,
+    SlipError,
     SlipHistory,
     from_few,
     march,
@@ -49,9 +51,10 @@ ComplexArray = npt.NDArray[np.complex128]
 # Sweeps equations for right-hand sides at other complex frequencies, to a relative residual.
 Kernel = Callable[[AffineLoads, ComplexArray, float], Sweep]
 
-# Residual of the kernel's sweep. The quadrature makes ten thousand times as much of an error of P,
-# which is of the second order in the residual: slip is off by less than 1e-9, between numbers of
-# groups that share out the sweep as well (with 1e-5 it was 5e-9).
+# Residual of the kernel's sweep. The error of P is of the second order in it, 1e-11, and between
+# samples P is right to some 1e-11 as well; the quadrature makes up to ten thousand times as much of
+# them at its last weights, which next to no slip meets. Slip was off by 4e-10 in all, and 1e-9
+# between numbers of groups that share out the sweep (with 1e-5 it was 5e-9).
 _KERNEL = 3e-6
 _ROLL_OFF = 0.5  # of the highest line, from where on less and less of λ̈ excites vibration
 _LEAST = 4  # samples of a lapse, however fast it slips
@@ -141,6 +144,9 @@ class LapseSlip:
 
         Returns:
             What slipped, of a lapse that ends where a new mechanism is due.
+
+        Raises:
+            SlipMarchError: The march has failed; on every rank.
         """
         state, steps = self._state, len(self._driving)
         if state.rate == 0 and self._driving.max() <= self._yield_force:
@@ -150,10 +156,13 @@ class LapseSlip:
             quadrature = ConvolutionQuadrature(steps, self._time_step)
             weights = quadrature.weights(self._kernel(kernel, quadrature.s))
             arguments = self._driving, self._yield_force, weights, self._time_step, state.rate
-            history = march(*arguments, most_slip)
-            if history.num_steps <= _LEAST * self._substeps:
-                history = march(*arguments, None)
-                history = _first(history, _LEAST * self._substeps + 1)
+            try:
+                history = march(*arguments, most_slip)
+                if history.num_steps <= _LEAST * self._substeps:
+                    history = march(*arguments, None)
+                    history = _first(history, _LEAST * self._substeps + 1)
+            except (SlipError, ValueError) as error:  # such as weights of no passive ground
+                raise SlipMarchError(str(error)) from error
             # A difference of λ there has half of the first α in it, and is no rate of the lapse.
             history.rate[0] = state.rate
         count = (history.num_steps - 1) // self._substeps

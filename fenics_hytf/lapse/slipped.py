@@ -53,8 +53,8 @@ class Slipped:
         num_samples: Samples of the lapse, fewer than planned where a new mechanism is due.
         mass: φᵀM r [kg, in 2D kg/m].
         modal_mass: φᵀMφ [kg, in 2D kg/m].
-        rigid: Slip of a rigid block in the lapse [m].
-        decoupled: Slip of a rigid block under ``driving`` [m].
+        rigid: What a rigid block slips in the lapse, times φᵀM r/φᵀMφ to be compared with λ [m].
+        decoupled: Likewise of a rigid block under ``driving`` [m].
         yield_force: Q_y [N, in 2D N/m].
     """
 

@@ -29,6 +29,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fenics_hytf.domain import Domain
+from fenics_hytf.lapse.filling import cell_integrals
 from fenics_hytf.lapse.ground import Ground, Moduli
 from fenics_hytf.lapse.material import with_bulk_kept
 from fenics_hytf.lapse.records import SofteningResult
@@ -96,10 +97,8 @@ class Softening:
 
     def _softest(self, points: Points) -> RealArray:
         """Of every cell the mean over its points by volume, 1 where it has none."""
-        sums = np.zeros((self._domain.num_owned_cells, 2))
-        parts = points.volume[:, None] * np.column_stack([np.ones(len(points)), points["softest"]])
-        np.add.at(sums, points.cell, parts)
-        volume, total = self._domain.gather_cells(sums).T
+        values = np.column_stack([np.ones(len(points)), points["softest"]])
+        volume, total = cell_integrals(self._domain, points, values, None).T
         return np.where(volume > 0, total, 1.0) / np.where(volume > 0, volume, 1.0)
 
 

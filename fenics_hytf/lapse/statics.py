@@ -44,7 +44,7 @@ BALANCE = 1e-9
 
 _LEVEL = 1e-6  # shear over vertical stress, below which ground is level
 _STEPS = 40  # of spreading: points on Gauss points take one, others some ten
-# a_K here, a millionth of the usual: it bears what acts on mechanisms, and hardly anything else.
+# a_K here, a millionth of that of sections: it bears what acts on mechanisms, and hardly more.
 _LIGHTLY = 5e-8
 
 

@@ -10,7 +10,8 @@ is penalised,
 
 with Ē the mean of Young's moduli of both cells (across a section of shear moduli) and h the mean of
 their sizes normal to the facet. Linear displacement has no such jump, so ground that strains
-evenly does not feel it. There is no ghost mass: it would put a false resonance at √(γ_K/γ_M).
+evenly does not feel it. There is no ghost mass in the sweep: it would put a false resonance at
+√(γ_K/γ_M). Momenta are brought to nodes with one.
 
 Facets of hexahedra are integrated at their nodes (Gauss and Lobatto). That changes nothing where
 the jump is the same all over a facet. A cell that twists about the facet, whose jump changes its

@@ -19,9 +19,9 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh
-from scipy.linalg import expm
 
 from fenics_hytf.particles.geometry import RealArray, chunks, jacobians
+from fenics_hytf.particles.kinematics import exponentials
 from fenics_hytf.particles.move import show_to_all
 from fenics_hytf.particles.points import IntArray, Points, quadrature_rule
 from fenics_hytf.particles.search import cell_search, locate
@@ -76,7 +76,7 @@ def carry_pieces(points: Points, gradient: RealArray) -> None:
         gradient: L[p, i, j] = d du_i / d x_j [-], shape ``(n, gdim, gdim)``.
     """
     for chunk in chunks(len(points)):
-        points["piece"][chunk] = expm(gradient[chunk]) @ points["piece"][chunk]
+        points["piece"][chunk] = exponentials(gradient[chunk]) @ points["piece"][chunk]
 
 
 def spread(mesh: Mesh, points: Points, values: RealArray) -> RealArray:

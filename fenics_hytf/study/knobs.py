@@ -127,8 +127,7 @@ class Knobs:
             values["sweep"] = [*values["sweep"], 0.0]
         else:
             self.notes.append(
-                "sweep tolerance: no direct sweep, which is a factorisation for each time step of "
-                "the slip"
+                "sweep tolerance: no direct sweep, as the kernel of the slip is reduced in any case"
             )
         self.values = {name: tuple(found) for name, found in values.items() if len(found) > 1}
 

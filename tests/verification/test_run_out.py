@@ -22,7 +22,7 @@ def run_out(comm: MPI.Comm, group_size: int | None = None) -> Result:
     }
     data = slope(8e3, convection=True, sliding=sliding)
     data["motion"][0]["harmonic"] |= {"cycles": 1, "samples": 50}
-    # Few lines, each solved for itself: the reduced sweep begins from random numbers.
+    # Few lines, each solved for itself: what is reduced begins from random numbers.
     data["solver"] |= {"sweep": "direct", "max_frequency": 20.0}
     return simulate(Scene.from_dict(data), comm, group_size=group_size)
 
