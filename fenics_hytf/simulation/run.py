@@ -100,28 +100,30 @@ class Run:
             self.free_fields = self._level_ground()
             self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
             self._owned.append(self.equations)
-            statics = None if scene.effects.gravity is None else Statics(scene, self.domain)
-            if statics is not None:
-                self._owned.append(statics)
+            self.statics = None if scene.effects.gravity is None else Statics(scene, self.domain)
+            if self.statics is not None:
+                self._owned.append(self.statics)
             self.continuity: Continuity = choose_continuity(
-                scene, self.domain, self.equations, statics
+                scene, self.domain, self.equations, self.statics
             )
             self._owned.append(self.continuity)
             if scene.effects.sliding is not None:
-                assert isinstance(self.continuity, Handover) and statics is not None
+                assert isinstance(self.continuity, Handover) and self.statics is not None
                 self._sliding = Sliding(
-                    scene, self.domain, self.equations, self.continuity, statics
+                    scene, self.domain, self.equations, self.continuity, self.statics
                 )
                 self._owned.append(self._sliding)
             if scene.effects.softening:
-                assert statics is not None
-                self._softening = Softening(self.domain, statics)
+                assert self.statics is not None
+                self._softening = Softening(self.domain, self.statics)
             self.points = seed_points(scene, self.domain, self.continuity.fields)
             self.observation = Observation(
                 scene, self.domain, self.equations, self.continuity, self.points
             )
             self._owned.append(self.observation)
-            self._weighing = Weighing(scene, self.domain, self.equations, self.observation, statics)
+            self._weighing = Weighing(
+                scene, self.domain, self.equations, self.observation, self.statics
+            )
             cycles = scene.effects.degradation
             self._cycles = None if cycles is None else CycleCount(cycles, self.domain)
             names = self.domain.region_names

@@ -73,7 +73,7 @@ def lapse_by_lapse(run: Run) -> Iterator[int]:
 
 def imbalance(run: Run) -> float:
     """What is out of balance, of the weight."""
-    statics = run._weighing._statics
+    statics = run.statics
     left = statics.unknowns.collect(statics.imbalance(run.points))
     return left.norm() / statics.unknowns.collect(statics.weight_of(run.points)).norm()
 
@@ -190,7 +190,7 @@ def test_25_a_slope_that_is_squeezed_three_ways(silence, figure):
     with started(case) as run:
         squeeze(run.domain, run.points)
         run.weigh()
-        domain, points, statics = run.domain, run.points, run._weighing._statics
+        domain, points, statics = run.domain, run.points, run.statics
         filling = FillingSurvey(case, domain)(points)
         weight = statics.weight_of(points)
         gauss = InternalForce(domain)

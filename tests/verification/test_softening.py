@@ -27,7 +27,7 @@ def test_points_move_by_what_the_slope_gives_way(figure, monkeypatch):
     soften = steps.Run.soften
 
     def watched(run, solved):
-        statics = run._weighing._statics
+        statics = run.statics
 
         def imbalance() -> np.ndarray:
             return statics.unknowns.collect(statics.imbalance(run.points)).array_r.real.copy()
