@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Figures that the tests measure, printed as one table at the end; one rank that reports."""
 
 import io

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Grids of masses and springs: systems small enough for dense algebra."""
 
 import numpy as np

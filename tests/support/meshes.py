@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Mesh files made by gmsh's own Python interface, and scenes round a mesh."""
 
 import runpy

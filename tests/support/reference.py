@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reference columns: the data, the scenes that repeat them, and closed forms."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Antiplane waves round a semi-circular canyon, against Trifunac's series (1973).
 
 A plane SH wave comes up through a half-space; the canyon of radius a in its surface scatters it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The two-layer column of the paper, shaken along itself, against its closed form."""
 
 import numpy as np

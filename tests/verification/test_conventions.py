@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The four conventions of the complex modulus: shear and compression waves in a uniform layer.
 
 Case a2 of the reference data prints the surface's complex transfer function for D = 5 % in each of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The demos are run as tests: each ends in an assertion against theory or a reference."""
 
 import runpy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A homogeneous embankment on a rigid base, plane strain, against an independent code: case e.
 
 The reference was computed by scikit-fem on 48 x 24 biquadratic quadrilaterals; its own error, seen

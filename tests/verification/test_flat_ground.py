@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Level ground with tied sides is a column: sections and blocks against it, on 1, 2 and 3 ranks.
 
 Cells of equal height and a pattern that repeats from cell to cell: what is tied repeats with the

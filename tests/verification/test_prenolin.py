@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """PRENOLIN's first canonical column, P1, under the published input, linear, on a rigid base.
 
 Input and column are those of the worked example "Prenolin_benchmark_P1model_PSV" of SEM2DPACK:

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The 24 m profile, equivalent linear, against pystrata: cases c and d of the reference.
 
 Cases c stand on a rigid base under a within motion, cases d on a compliant one under an outcrop

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Linear columns against closed forms and pystrata: cases a1, a2, b1, b2 of the reference data."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How a simulation stops, and what it says; scenes at the edge of what can be computed."""
 
 import numpy as np

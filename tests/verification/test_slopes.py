@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Sliding through whole simulations: against elastoplastic ground, lapses, energy, refusal."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Both components move: one record a direction, one influence vector a direction.
 
 The method's source writes a one on every degree of freedom for the influence vector, which holds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Only what a scene calls for is assembled and solved: the counts of the work show it."""
 
 from dataclasses import asdict
