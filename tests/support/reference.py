@@ -12,6 +12,7 @@ from fenics_hytf.scene import Scene
 DATA = Path(__file__).parents[1] / "data"
 SHARED = Path(__file__).parents[3] / "shared" / "reference" / "ground"
 PUBLISHED = SHARED.parent / "published"
+SLIDING = SHARED.parent / "sliding"
 G0 = 9.80665
 
 
@@ -23,6 +24,19 @@ def load(name: str) -> dict:
     if SHARED.exists():
         pytest.fail(f"{name}: {SHARED} is there, but not this case")
     pytest.skip(f"{name} holds a recorded motion and is not in the repository")
+
+
+def load_sliding(name: str) -> dict:
+    """A file of slips in the time domain, where the reference data are beside the checkout."""
+    if not SLIDING.exists():
+        pytest.skip(f"{name} is beside the repository, not in it")
+    return json.loads((SLIDING / f"{name}.json").read_text())
+
+
+def slope2d_case(motion: str) -> dict:
+    """What ``slope2d`` has for a motion of ``study.sliding_slope``."""
+    (case,) = (c for c in load_sliding("slope2d")["cases"] if c["motion"].startswith(motion))
+    return case
 
 
 def motion(case: dict) -> dict:

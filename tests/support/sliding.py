@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: MIT
-"""Scenes of ground that slides: a column on a weak cell, a small slope; and what slid of them."""
+"""Scenes of ground that slides: a column on a weak cell, two slopes; and what slid of them."""
 
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
+import fenics_hytf.simulation.run as steps
+from fenics_hytf.lapse import seed_points
+from fenics_hytf.particles import take_out
 from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import Result
+from fenics_hytf.simulation import Result, simulate
 
 GRAVITY = 9.81
 DENSITY = 1800.0
@@ -118,6 +122,67 @@ def slope(cohesion: float = 16e3, lapses: int = 1, *, mirrored: bool = False, **
         "solver": {"complex_modulus": "maxwell"},
         "output": {"receivers": {"crest": [crest, 6.0], "toe": [toe, 2.0]}},
     }
+
+
+def slope2d(motion: dict, lapses: int = 1, seam: float = 17e3, **effects) -> dict:
+    """The raw scene of ``study.sliding_slope``: 10 m at 1:1.5 with a seam, in squares of 1 m.
+
+    Args:
+        motion: A ``[[motion]]`` table.
+        lapses: Their number.
+        seam: Cohesion of the seam [Pa].
+        effects: ``[effects]`` besides gravity, sliding, locking and Rayleigh damping.
+    """
+    soil = {
+        "density": DENSITY,
+        "shear_wave_velocity": 200.0,
+        "poisson": 28 / 62,  # a bulk modulus ten times the shear modulus
+        "damping": 0.0,
+    }
+    regions = [
+        {"soil": "clay", "below": 5.0},
+        {"soil": "air", "polygon": [[0, 15], [60, 15], [60, 16], [0, 16]]},
+        {"soil": "seam", "polygon": [[42, 2.6], [0, 15.2], [0, 17.8], [42, 5.2]]},
+        {"soil": "clay"},
+    ]
+    return {
+        "mesh": {
+            "box": {"size": [60.0, 16.0], "cells": [60, 16]},
+            "empty": ["air"],
+            "points_per_cell": 16,
+            "regions": regions,
+        },
+        "soil": {"clay": soil | {"cohesion": 150e3}, "seam": soil | {"cohesion": seam}},
+        "motion": [motion],
+        "boundary": {"left": "roller", "right": "roller"},
+        "lapses": {"count": lapses},
+        "effects": {
+            "gravity": {"acceleration": GRAVITY},
+            "sliding": True,
+            "locking": True,
+            "rayleigh": {"beta": 5e-4},
+            **effects,
+        },
+        "output": {"receivers": {"crest": [15.0, 14.5]}},
+    }
+
+
+def simulate_slope2d(data: dict) -> Result:
+    """Run ``slope2d`` with the cells that its surface cuts filled in part.
+
+    Points above the surface are not seeded, nor those in cells that a fifth would not fill.
+    """
+
+    def below_the_surface(scene, domain, fields):
+        points = seed_points(scene, domain, fields)
+        above = points.x[:, 1] > 5 + np.clip((35 - points.x[:, 0]) / 1.5, 0, 10)
+        share = np.bincount(points.cell, points.volume * ~above, domain.num_owned_cells)
+        take_out(points, above | (share[points.cell] < 0.2), "delete")
+        return points
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(steps, "seed_points", below_the_surface)
+        return simulate(Scene.from_dict(data))
 
 
 def total(result: Result) -> float:

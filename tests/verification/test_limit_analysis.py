@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """Slip mechanisms against what limit analysis knows: cuts, slopes, level layers, and each other."""
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -16,7 +15,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from scipy.sparse.linalg import splu
 from support.meshes import scene
-from support.reference import SHARED
+from support.reference import load_sliding
 
 from fenics_hytf.domain import Domain, MeshData, make_domain
 from fenics_hytf.domain.grids import box_mesh
@@ -429,10 +428,7 @@ def driving_peak(slope: Ground, found: Mechanism, drive: np.ndarray, dt: float) 
 def test_reference_slope(figure):
     """k_y over the largest acceleration of the linear response, as the reference has it."""
     pytest.importorskip("pyslammer")
-    path = SHARED.parent / "sliding" / "slope2d.json"
-    if not path.exists():
-        pytest.skip("the reference lies beside the checkout")
-    cases = json.loads(path.read_text())["cases"]
+    cases = load_sliding("slope2d")["cases"]
     slope, seam = reference_slope()
     found = slope.find(np.where(seam, 17e3, 150e3))
     for case, (name, motion) in zip(cases, motions().items(), strict=True):

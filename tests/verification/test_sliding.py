@@ -1,146 +1,30 @@
 # SPDX-License-Identifier: MIT
 """Sliding through whole simulations against independent references.
 
-Columns and slopes that are marched in time as ground that yields; closed forms; and the same scene
-in a mirror, on several ranks, stopped and gone on with, or too strong to slide.
+Columns that are marched in time as ground that yields; closed forms; and the same slope in a
+mirror, on several ranks, stopped and gone on with, or too strong to slide.
 """
 
 import dataclasses
-import json
 import subprocess
 import sys
-from functools import cache
 from importlib.util import find_spec
-from pathlib import Path
 
-import meshio
 import numpy as np
 import pytest
 from mpi4py import MPI
-from support.reference import SHARED
+from support.reference import load_sliding
 from support.sliding import DENSITY, GRAVITY, column, in_file, open_energy, sine, slope, total
 
-import fenics_hytf.simulation.run as steps
-from fenics_hytf.lapse import seed_points
 from fenics_hytf.motion import recorded, refined
-from fenics_hytf.particles import take_out
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import CheckpointFolder, Result, simulate
-from fenics_hytf.study.elastoplastic import Section, elastoplastic_slope
-from fenics_hytf.study.sliding_slope import reference_motion
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
-FOLDER = SHARED.parent / "sliding"
 
 with_records = pytest.mark.skipif(
     find_spec("pyslammer") is None, reason="pyslammer, an optional extra, is not installed"
 )
-
-
-def described(result: Result) -> str:
-    slip = result.lapses[0].slip
-    k_max = max(lapse.slip.driving.max() for lapse in result.lapses) / GRAVITY
-    blocks = (
-        sum(getattr(lapse.slip, n) for lapse in result.lapses) for n in ("rigid", "decoupled")
-    )
-    rigid, decoupled = blocks
-    return (
-        f"k_y {slip.yield_coefficient:.4f}, k_max {k_max:.3f}, slip {total(result):.3f}, "
-        f"rigid {rigid:.3f}, decoupled {decoupled:.3f} m"
-    )
-
-
-# ---------------------------------------------------------------- slopes that yield
-
-MODULUS = DENSITY * 200.0**2
-NEARLY_INCOMPRESSIBLE = 28 / 62  # ν of a bulk modulus ten times the shear modulus
-STIFF = {"density": DENSITY, "shear_wave_velocity": 200.0, "poisson": NEARLY_INCOMPRESSIBLE}
-STRONG, SEAM = 150e3, 17e3  # [Pa]
-SLOPE = {
-    "boundary": {"left": "roller", "right": "roller"},
-    "effects": {
-        "gravity": {"acceleration": GRAVITY},
-        "sliding": True,
-        "locking": True,
-        "rayleigh": {"beta": 5e-4},
-    },
-}
-
-
-@with_records
-def test_a_slope_under_a_record(tmp_path, monkeypatch, figure):
-    """The second case of slope2d.json; cells that are cut by the surface are filled in part."""
-    if not SHARED.exists():
-        pytest.skip("slope2d.json is beside the repository, not in it")
-    case = json.loads((FOLDER / "slope2d.json").read_text())["cases"][1]
-
-    def below_the_surface(scene, domain, fields):
-        points = seed_points(scene, domain, fields)
-        above = points.x[:, 1] > 5 + np.clip((35 - points.x[:, 0]) / 1.5, 0, 10)
-        share = np.bincount(points.cell, points.volume * ~above, domain.num_owned_cells)
-        take_out(points, above | (share[points.cell] < 0.2), "delete")
-        return points
-
-    monkeypatch.setattr(steps, "seed_points", below_the_surface)
-    regions = [
-        {"soil": "clay", "below": 5.0},
-        {"soil": "air", "polygon": [[0, 15], [60, 15], [60, 16], [0, 16]]},
-        {"soil": "seam", "polygon": [[42, 2.6], [0, 15.2], [0, 17.8], [42, 5.2]]},
-        {"soil": "clay"},
-    ]
-    box = {"size": [60.0, 16.0], "cells": [60, 16]}
-    data = SLOPE | {
-        "mesh": {"box": box, "empty": ["air"], "points_per_cell": 16, "regions": regions},
-        "soil": {"clay": STIFF | {"cohesion": STRONG}, "seam": STIFF | {"cohesion": SEAM}},
-        "motion": [in_file(tmp_path, *reference_motion("Northridge"))],
-    }
-    result = simulate(Scene.from_dict(data))
-    off = abs(total(result) / case["slip_elastoplastic_m"] - 1)
-    figure(f"slope2d, Northridge, elastoplastic .140 m: {described(result)}", off, 0.2)
-    figure("slope2d, Northridge: energy left open", abs(open_energy(result)), 0.03)
-
-
-MESH = Path(__file__).parents[2] / "meshes" / "slope_seam.msh"
-
-
-def elastoplastic_twin() -> Section:
-    """The very cells of the mesh file that hold soil."""
-    mesh = meshio.read(MESH)
-    x, names = mesh.points[:, :2], {tag: name for name, (tag, _) in mesh.field_data.items()}
-    region = np.array([names[tag] for tag in mesh.cell_data_dict["gmsh:physical"]["quad"]])
-    cells = mesh.cells_dict["quad"][region != "air"]
-    a, b = x[cells[:, 1]] - x[cells[:, 0]], x[cells[:, 2]] - x[cells[:, 0]]
-    backward = a[:, 0] * b[:, 1] < a[:, 1] * b[:, 0]
-    cells[backward] = cells[backward, ::-1]
-    fixed = np.zeros(x.shape, bool)
-    fixed[x[:, 1] == 0] = True
-    fixed[(x[:, 0] == 0) | (x[:, 0] == x[:, 0].max()), 0] = True
-    return Section(
-        x,
-        cells,
-        density=DENSITY,
-        shear_modulus=MODULUS,
-        bulk_modulus=10 * MODULUS,
-        cohesion=np.where(region[region != "air"] == "seam", SEAM, STRONG),
-        fixed=fixed,
-        beta=5e-4,
-        gravity=(0.0, -GRAVITY),
-    )
-
-
-def test_a_slope_on_a_mesh_that_fits(figure):
-    """In the time domain, on the same mesh, nothing is told where it slips."""
-    motion = sine(4, 400, 0.25)
-    reference, dt = reference_motion("sine")
-    expected = elastoplastic_slope(elastoplastic_twin(), reference, dt).slip
-    data = SLOPE | {
-        "mesh": {"file": str(MESH), "empty": ["air"]},
-        "soil": {"soil": STIFF | {"cohesion": STRONG}, "seam": STIFF | {"cohesion": SEAM}},
-        "motion": [motion],
-    }
-    result = simulate(Scene.from_dict(data))
-    said = f"slope on its mesh, elastoplastic {expected:.3f} m: {described(result)}"
-    figure(said, abs(total(result) / expected - 1), 0.2)
 
 
 # ---------------------------------------------------------------- columns that yield
@@ -150,19 +34,13 @@ RECORDS = {
     "Kobe": "Kobe_1995_TAK-090",
     "Loma Prieta": "Loma_Prieta_1989_HSP-000",
 }
+MODULUS = DENSITY * 200.0**2  # [Pa]
 WEIGHTLESS = 1e-3  # [kg/m3], of the weak cell
 
 
 def viscosity(speed: float) -> float:
     """β of 5 % at the period of 30 m [s]."""
     return 0.05 * 4 * 30.0 / speed / np.pi
-
-
-@cache
-def column_cases() -> list[dict]:
-    if not SHARED.exists():
-        pytest.skip("the sliding columns are beside the repository, not in it")
-    return json.loads((FOLDER / "columns.json").read_text())["cases"]
 
 
 def column_drive(case: dict) -> np.ndarray:
@@ -181,7 +59,7 @@ def column_drive(case: dict) -> np.ndarray:
 @pytest.mark.parametrize("motion", ["sine 1Hz x5", "Northridge"])
 def test_columns(motion, tmp_path, figure):
     """Up to k_y/k_max .4: above, slips are small and hang on the tips of peaks."""
-    cases = [case for case in column_cases() if case["motion"] == motion]
+    cases = [case for case in load_sliding("columns")["cases"] if case["motion"] == motion]
     cases = [case for case in cases if case["ky_over_kmax"] in (0.2, 0.4)]
     assert len(cases) == 6
     ratio = []
