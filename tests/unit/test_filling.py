@@ -13,6 +13,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy import sparse
+from support.cells import empty_a_cell
 from support.meshes import MOTION, SOIL, scene
 
 from fenics_hytf.domain import build, side_column
@@ -92,11 +93,7 @@ def emptied(case, middle, comm=WORLD):
     """Level ground, a cell's points moved to its neighbours, and its soil left where it was."""
     domain = build(case, comm)
     points = seed_points(case, domain)
-    away = points.x - middle
-    inside = np.abs(away).max(axis=1) < 0.5
-    way = np.where(inside[:, None], 0.4 * np.sign(away), 0.0) * [1, 0]
-    points["piece"][:, :, 2] -= way
-    move(domain.mesh, points, way)
+    empty_a_cell(domain.mesh, points, middle)
     return SimpleNamespace(
         domain=domain, points=points, filling=FillingSurvey(case, domain)(points)
     )
