@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""33: softening. Naively stress falls with every fluctuation of G, and the slope ratchets.
+"""Hard case 33, the half of it that softens: guards what moduli that fall leave behind.
 
-With the running minimum of G an infinite slope shears by γ = τ₀(1/G_min − 1/G₀), in as many lapses
-as one likes, and earthquakes that bring no new minimum move nothing.
+Naively stress falls with every fluctuation of G, and the slope ratchets. With the running minimum
+of G an infinite slope shears by γ = τ₀(1/G_min − 1/G₀), in as many lapses as one likes, and
+earthquakes that bring no new minimum move nothing. Sliding is in ``test_sliding.py``.
 """
 
 from itertools import pairwise
