@@ -216,7 +216,7 @@ def test_energy_of_a_uniform_stress(cell):
 
 @pytest.mark.parametrize("cell", CELLS)
 def test_both_are_the_tangent_of_the_stress_update(cell):
-    """METHOD 5.2: K_L + K_NL is the derivative of the internal force of the points' stress update.
+    """K_L + K_NL is the derivative of the internal force of the points' stress update.
 
     f(u) = Σ_p V_p e^{tr L} σ_new ∂N/∂x at the moved nodes, differenced about u = 0.
     """

@@ -29,7 +29,7 @@ from fenics_hytf.particles import (
 
 CELLS = ["triangle", "quadrilateral", "tetrahedron", "hexahedron"]
 DENSITY = np.array([1800.0, 2100.0])
-# Sums of a few tens of terms of size one, each rounded: 1e-13 is 450 eps, and the bound.
+# Sums of a few tens of terms of size one, each rounded: 1e-13 is 450 eps.
 ROUNDING = 1e-13
 
 

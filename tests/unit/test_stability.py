@@ -58,7 +58,7 @@ def told(out: str) -> str:
 
 
 def test_of_a_vertical_cut(cut, hytf, figure):
-    """N = γH/c is 3.776, approached from above; SLIDING asks for 3.78 to 3.95 in such cells."""
+    """N = γH/c is 3.776, approached from above: cells of H/20 are left 5 % too much."""
     code, out, err = hytf("check", "cut.toml")
     assert (code, err) == (0, LOOKING)
     safety = float(told(out).removeprefix("factor of safety at rest "))
