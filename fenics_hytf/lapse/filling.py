@@ -34,7 +34,7 @@ from fenics_hytf.domain import (
 )
 from fenics_hytf.lapse.errors import DetachedError
 from fenics_hytf.operators import GhostForm, InternalForce, gauss_sites
-from fenics_hytf.particles import Points, spread, take_out
+from fenics_hytf.particles import Points, piece_integrals, take_out
 from fenics_hytf.scene import Scene, SceneError, default_kind
 
 RealArray = npt.NDArray[np.float64]
@@ -54,14 +54,15 @@ class Filling:
             ``(num_cells,)``.
         edge: Cells at the edge, shape ``(num_cells,)``.
         share: Volume of the points over that of the cell [-], shape ``(num_cells,)``.
-        spread: The same of their pieces, where they have any; nought in empty cells alone.
+        fill: The same of their pieces, where they have any; nought in empty cells alone, elsewhere at
+            least the machine epsilon.
         gap: Cells without a point that pieces fill, shape ``(num_cells,)``.
     """
 
     weight: RealArray
     edge: Cells
     share: RealArray
-    spread: RealArray
+    fill: RealArray
     gap: Cells
 
     @property
@@ -131,7 +132,7 @@ def cell_integrals(
     np.add.at(sums, points.cell, points.volume[:, None] * values)
     if filling is not None and filling.gap.any():
         gap = filling.gap[domain.input_cells[: len(sums)]]
-        sums[gap] = spread(domain.mesh, points, values)[gap]
+        sums[gap] = piece_integrals(domain.mesh, points, values)[gap]
     return domain.gather_cells(sums)
 
 
@@ -178,21 +179,21 @@ class FillingSurvey:
         if self._policy != "error" and off.any():
             take_out(points, off[self._domain.input_cells[points.cell]], self._policy)
             share = np.where(off, 0.0, share)
-        return self._weigh(share, self._spread(points, share))
+        return self._weigh(share, self._fill(points, share))
 
     def _share(self, points: Points) -> RealArray:
         filled = np.bincount(points.cell, points.volume, self._domain.num_owned_cells)
         return self._domain.gather_cells(filled) / self._volume
 
-    def _spread(self, points: Points, share: RealArray) -> RealArray:
+    def _fill(self, points: Points, share: RealArray) -> RealArray:
         if "piece" not in points.history:
             return share
-        pieces = spread(self._domain.mesh, points, np.ones((len(points), 1)))[:, 0]
+        pieces = piece_integrals(self._domain.mesh, points, np.ones((len(points), 1)))[:, 0]
         return self._domain.gather_cells(pieces) / self._volume
 
-    def _gaps(self, counted: Cells, spread: RealArray) -> Cells:
+    def _gaps(self, counted: Cells, fill: RealArray) -> Cells:
         """Cells without a point that pieces fill by more than half, away from empty cells."""
-        gap = ~counted & (spread > 0.5)
+        gap = ~counted & (fill > 0.5)
         while gap.any():
             exposed = gap & self._beside_empty(counted | gap)
             if not exposed.any():
@@ -214,14 +215,14 @@ class FillingSurvey:
         _, number = sparse.csgraph.connected_components(links, directed=False)
         return np.where(filled, number, -1)
 
-    def _weigh(self, share: RealArray, spread: RealArray) -> Filling:
-        gap = self._gaps(share > 0, spread)
+    def _weigh(self, share: RealArray, fill: RealArray) -> Filling:
+        gap = self._gaps(share > 0, fill)
         filled = gap | (share > 0)
         edge = self._beside_empty(filled)
         weight = np.where(edge, np.minimum(share, 1.0), filled.astype(float))
         # A long piece may leave next to nothing in the very cell of its point.
-        spread = np.where(filled, np.maximum(spread, np.finfo(float).eps), 0.0)
-        return Filling(weight, edge, share, spread, gap)
+        fill = np.where(filled, np.maximum(fill, np.finfo(float).eps), 0.0)
+        return Filling(weight, edge, share, fill, gap)
 
 
 def _held_axes(domain: Domain, name: str, kind: str) -> tuple[int, ...]:

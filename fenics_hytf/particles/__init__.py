@@ -23,7 +23,7 @@ from fenics_hytf.particles.move import (
     move,
     take_out,
 )
-from fenics_hytf.particles.pieces import carry_pieces, first_pieces, spread
+from fenics_hytf.particles.pieces import carry_pieces, first_pieces, piece_integrals
 from fenics_hytf.particles.points import Points, quadrature_rule, seed
 from fenics_hytf.particles.resample import resample_matrix
 from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
@@ -57,12 +57,12 @@ __all__ = [
     "locate",
     "move",
     "particle_mass_matrix",
+    "piece_integrals",
     "quadrature_rule",
     "resample_matrix",
     "resolve_owners",
     "scatter_points",
     "seed",
-    "spread",
     "take_out",
     "to_components",
     "to_tensor",

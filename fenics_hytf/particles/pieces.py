@@ -79,7 +79,7 @@ def carry_pieces(points: Points, gradient: RealArray) -> None:
         points["piece"][chunk] = exponentials(gradient[chunk]) @ points["piece"][chunk]
 
 
-def spread(mesh: Mesh, points: Points, values: RealArray) -> RealArray:
+def piece_integrals(mesh: Mesh, points: Points, values: RealArray) -> RealArray:
     """Integrals over cells of what pieces bring into them (collective).
 
     A piece with all its corners in the cell of its point lies there; others are counted in parts,

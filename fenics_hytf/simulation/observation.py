@@ -182,7 +182,7 @@ class Observation:
             peak_displacement=peaks.displacement,
             change=np.zeros(len(ground.region)) if change is None else change,
             degradation=ground.degradation,
-            fill=None if ground.filling is None else ground.filling.spread,
+            fill=None if ground.filling is None else ground.filling.fill,
         )
 
     def _slip_result(self, slip: Slipped) -> SlipResult:

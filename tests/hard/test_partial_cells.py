@@ -60,7 +60,7 @@ class HeldEverywhere(Filling):
 
 
 def as_kind(filling: Filling, kind: type[Filling], **options) -> Filling:
-    given = (filling.weight, filling.edge, filling.share, filling.spread, filling.gap)
+    given = (filling.weight, filling.edge, filling.share, filling.fill, filling.gap)
     return kind(*given, **options)
 
 

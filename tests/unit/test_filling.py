@@ -122,7 +122,7 @@ def test_a_cell_without_a_point_is_a_gap_where_soil_fills_it():
     assert found.share[found.gap] == 0 and found.whole[found.gap]
     np.testing.assert_array_equal(found.edge, cells // WIDTH == 4)
     np.testing.assert_array_equal(found.filled, cells // WIDTH < 5)
-    np.testing.assert_allclose(found.spread, found.filled.astype(float), atol=1e-13)
+    np.testing.assert_allclose(found.fill, found.filled.astype(float), atol=1e-13)
 
 
 @pytest.mark.mpi

@@ -10,7 +10,7 @@ import pytest
 from dolfinx.mesh import CellType
 from mpi4py import MPI
 
-from fenics_hytf.particles import Points, carry_pieces, first_pieces, move, seed, spread
+from fenics_hytf.particles import Points, carry_pieces, first_pieces, move, piece_integrals, seed
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 SIDE = 12  # cells of 1 m along a side of the mesh
@@ -54,7 +54,7 @@ def share(mesh, volume):
 
 
 def filled(mesh, points):
-    return share(mesh, spread(mesh, points, np.ones((len(points), 1)))[:, 0])
+    return share(mesh, piece_integrals(mesh, points, np.ones((len(points), 1)))[:, 0])
 
 
 def turned(x, part):
@@ -122,7 +122,7 @@ def test_values_are_spread_with_the_soil():
     mesh = square(WORLD)
     points = soil(mesh, 9)
     height = points.x[:, 1:]
-    ones, heights = spread(mesh, points, np.column_stack([np.ones(len(points)), height])).T
+    ones, heights = piece_integrals(mesh, points, np.column_stack([np.ones(len(points)), height])).T
     mean = share(mesh, heights) / np.where(share(mesh, ones) > 0, share(mesh, ones), 1.0)
     rows = np.arange(SIDE * SIDE) // SIDE
     block = share(mesh, ones) > 0
