@@ -54,8 +54,8 @@ class Filling:
             ``(num_cells,)``.
         edge: Cells at the edge, shape ``(num_cells,)``.
         share: Volume of the points over that of the cell [-], shape ``(num_cells,)``.
-        fill: The same of their pieces, where they have any; nought in empty cells alone, elsewhere at
-            least the machine epsilon.
+        fill: The same of their pieces, where they have any; nought in empty cells alone, elsewhere
+            the machine epsilon or more.
         gap: Cells without a point that pieces fill, shape ``(num_cells,)``.
     """
 
