@@ -17,6 +17,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import KDTree
 
 from fenics_hytf import _compat
 from fenics_hytf.domain.checks import refuse_tangled_cells
@@ -37,6 +38,7 @@ _CELLS = {
     "hexahedron27": ("hexahedron", 3, 2, "quad9"),
 }
 _FACETS = {"line": "interval", "line3": "interval"} | {k: v[0] for k, v in _CELLS.items()}
+_APART = 1e-9  # of the size of a mesh: nodes that are not farther apart are at one place
 _IGNORED = {"vertex", "line", "line3", "triangle", "triangle6", "quad", "quad9"}
 
 
@@ -83,6 +85,7 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
         facets,
     )
     refuse_tangled_cells(data)
+    _refuse_split_nodes(points, path)
     return data
 
 
@@ -155,6 +158,18 @@ def _points(
         found = f"cells of {path.name} out of the plane z = const"
         raise _fault(found, "a 2D mesh in x and y, y up, or the cells of a volume")
     return points[:, :gdim]
+
+
+def _refuse_split_nodes(points: npt.NDArray[np.float64], path: Path) -> None:
+    """Raise where parts touch without hanging together."""
+    pairs = KDTree(points).query_pairs(_APART * np.ptp(points, axis=0).max(), output_type="ndarray")
+    if len(pairs):
+        where = ", ".join(f"{x:.6g}" for x in points[pairs[0, 0]])
+        raise _fault(
+            f"{len(pairs)} pairs of nodes of {path.name} in one place, the first at ({where})",
+            "parts that share the nodes where they touch, or they do not hold each other; in gmsh: "
+            "Coherence, or gmsh.model.mesh.removeDuplicateNodes()",
+        )
 
 
 def _fault(found: str, expected: str) -> SceneError:

@@ -14,7 +14,11 @@ from fenics_hytf.scene import Scene
 
 
 def choose_continuity(
-    scene: Scene, domain: Domain, equations: Equations, statics: Statics | None = None
+    scene: Scene,
+    domain: Domain,
+    equations: Equations,
+    statics: Statics | None = None,
+    after: int | None = None,
 ) -> Continuity:
     """What hands over from lapse to lapse in a scene.
 
@@ -23,6 +27,7 @@ def choose_continuity(
         domain: The domain.
         equations: Its equations.
         statics: Static stress and weight, where the scene calls for gravity.
+        after: Samples after the motion that lapses may reach; as the scene says if ``None``.
 
     Returns:
         The continuity of the scene's scheme.
@@ -31,5 +36,6 @@ def choose_continuity(
     if scheme.name == "steady":
         return Steady(scene, equations.axes)
     if scheme.name == "handover":
-        return Handover(scene, domain, equations, scheme, statics)
+        after = scene.samples_after if after is None else after
+        return Handover(scene, domain, equations, scheme, statics, after)
     return WholeRecord(scene, domain, equations, scheme)

@@ -102,7 +102,9 @@ class FreeField:
         column = self._side.domain
         self._scene = _level_ground(scene, domain.gdim)
         self._equations = Equations(self._scene, column, assemblies)
-        self._continuity = choose_continuity(self._scene, column, self._equations)
+        # What slides in the section may go on after the motion, and the column with it.
+        after = scene.samples_after
+        self._continuity = choose_continuity(self._scene, column, self._equations, after=after)
         points = seed_points(self._scene, column, self._continuity.fields)
         self._ground = survey(self._scene, column, points)
         self._equations.weigh(points)

@@ -69,6 +69,7 @@ class Handover:
         scheme: Its contour, and what points carry.
         statics: Static stress and weight: once points have moved, what is out of balance acts on
             the ground, (f_g − ∫Bᵀσ_static)/s on the right-hand side. ``None`` without gravity.
+        after: Samples after the motion that lapses may reach.
     """
 
     goes_on_from_nought = True
@@ -79,11 +80,11 @@ class Handover:
         domain: Domain,
         equations: Equations,
         scheme: Scheme,
-        statics: Statics | None = None,
+        statics: Statics | None,
+        after: int,
     ) -> None:
         self._scene, self._domain, self._equations = scene, domain, equations
         motion = band_limited(scene.base_acceleration, scene.dt, scene.solver.max_frequency)
-        after = scene.rest_samples + scene.segments[0].num_samples if scene.rest_samples else 0
         self._record = LapseRecord(np.pad(motion, ((0, 0), (0, after))), scene.dt)
         assert scheme.contour is not None
         self._contour = scheme.contour

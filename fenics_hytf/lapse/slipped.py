@@ -85,11 +85,24 @@ class Slipped:
 
     def at_samples(self, derivative: int = 0) -> RealArray:
         """λ or a derivative at the samples of the lapse, shape ``(num_samples,)``."""
-        history = (self.history.slip, self.history.rate, self.history.acceleration)[derivative]
-        values = history[: -1 : self.substeps].copy()
         if derivative == 2:
-            values[:1] *= 2  # the march takes half of what is there at its first step
-        return np.asarray(values)
+            return self._sampled_acceleration()
+        history = (self.history.slip, self.history.rate)[derivative]
+        return history[: -1 : self.substeps].copy()
+
+    def _sampled_acceleration(self) -> RealArray:
+        """Mean of λ̈ about each sample, weighed by 1 − |t|/dt.
+
+        What lasts for a step of the march, as where a mechanism gives way to the next, a record of
+        longer steps does not see as if it lasted for a sample.
+        """
+        steps, alpha = self.substeps, self.history.acceleration
+        weights = 1 - np.abs(np.arange(1 - steps, steps)) / steps
+        padded = np.concatenate([np.zeros(steps - 1), alpha])
+        means = np.convolve(padded, weights, "valid")[: len(alpha) - 1 : steps] / steps
+        # Before the first sample there is nothing of the lapse; of that the march takes a half.
+        means[:1] *= 2
+        return np.asarray(means)
 
     def seen_by(self, rows: PETSc.Mat) -> RealArray:
         """This rank's rows of a matrix times φ, shape ``(num_local_rows,)``."""

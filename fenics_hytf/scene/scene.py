@@ -150,6 +150,11 @@ class Scene:
         return 0 if sliding is None else int(np.ceil(sliding.longest / self.dt))
 
     @property
+    def samples_after(self) -> int:
+        """Samples after the last lapse that any lapse may reach, which no motion is in."""
+        return self.rest_samples + self.segments[0].num_samples if self.rest_samples else 0
+
+    @property
     def directions(self) -> tuple[str, ...]:
         """Direction of each motion."""
         return tuple(motion.direction for motion in self.motion)

@@ -53,6 +53,9 @@ def mesh_faults(
         scene.mesh.points_in(domain.mesh.topology.cell_name())
     except SceneError as error:
         faults += error.faults
+    if scene.mesh.file is not None and "base" not in domain.boundaries:
+        found = f"no boundary named base, only {', '.join(domain.boundaries) or 'nameless ones'}"
+        faults.append(Fault("mesh.file", found, "one named base, which the ground stands on"))
     faults += _locking_faults(scene, domain)
     faults += _sliding_faults(scene, domain)
     if scene.output is not None:
