@@ -266,7 +266,8 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
     sections.lapses, sections.solver = lapses, solver
     yield from continuity_rules(raw, lapses, solver, motions, segments)
     if effects.sliding is not None:
-        yield from sliding_rules(raw, lapses, solver)
+        duration = max(segment.num_samples for segment in segments) * dt
+        yield from sliding_rules(effects.sliding, lapses, solver, duration)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
     if handed_over and effects.softening and effects.convection:
         yield from softening_rules(solver)

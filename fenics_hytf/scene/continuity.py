@@ -18,11 +18,12 @@ import numpy.typing as npt
 from fenics_hytf.motion import Segment, dominant_frequency, energy_band
 from fenics_hytf.scene.faults import Fault, toml_text
 from fenics_hytf.scene.motion import MotionInput
-from fenics_hytf.scene.settings import Effects, Lapses, Solver
+from fenics_hytf.scene.settings import Effects, Lapses, Sliding, Solver
 from fenics_hytf.scene.table import as_list
 
 _ABOVE_BAND = 2.0  # f_max over the frequency below which 99 % of the energy lies
 _PERIODS = 10.0  # f_max times the length of a lapse
+_MOST_STEPS = 100_000  # of the march in a lapse: its time goes with their square, here some 10 s
 
 
 def resolve(
@@ -65,13 +66,16 @@ def resolve(
     )
 
 
-def sliding_rules(raw: dict[str, Any], lapses: Lapses, solver: Solver) -> Iterator[Fault]:
+def sliding_rules(
+    sliding: Sliding, lapses: Lapses, solver: Solver, duration: float
+) -> Iterator[Fault]:
     """What a mechanism that slides needs of lapses and law.
 
     Args:
-        raw: The raw table of the scene.
+        sliding: ``[effects.sliding]``.
         lapses: ``[lapses]``, resolved.
         solver: ``[solver]``, resolved.
+        duration: Of the longest lapse [s].
 
     Yields:
         The faults.
@@ -82,6 +86,9 @@ def sliding_rules(raw: dict[str, Any], lapses: Lapses, solver: Solver) -> Iterat
     if solver.complex_modulus != "maxwell":
         expected = '"maxwell": the kernel of a mechanism that slides needs a causal law'
         yield Fault("solver.complex_modulus", toml_text(solver.complex_modulus), expected)
+    if duration > _MOST_STEPS * sliding.time_step:
+        expected = f"at least {duration / _MOST_STEPS:.3g} s, {_MOST_STEPS} steps a lapse"
+        yield Fault("effects.sliding.time_step", f"{sliding.time_step:g}", expected)
 
 
 def softening_rules(solver: Solver) -> Iterator[Fault]:

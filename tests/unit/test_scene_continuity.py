@@ -3,6 +3,7 @@
 
 import pytest
 from mpi4py import MPI
+from support.sliding import slope
 
 from fenics_hytf.motion import dominant_frequency, energy_band
 from fenics_hytf.scene import Scene, check
@@ -252,3 +253,11 @@ def test_transient_lapses_have_twenty_samples(lapses, key):
     assert "at least 20 samples" in fault.expected
     assert not found(**lapses, continuity="steady")
     assert not found(count=20)
+
+
+def test_a_march_of_too_many_steps_is_refused():
+    data = slope(sliding={"time_step": 1e-9})
+    [fault] = check(data, ".")[1]
+    assert fault.key == "effects.sliding.time_step"
+    assert "100000 steps a lapse" in str(fault)
+    assert not check(slope(sliding={"time_step": 1e-4}), ".")[1]

@@ -140,3 +140,20 @@ def test_a_slope_that_slides_hardly_feels_free_fields(figure):
     figure("slope between near sides, free field: slip", off["free_field"], 0.01)
     worse = off["dashpot"] / off["free_field"]
     figure("the same with dashpots, times as much", worse, 3.0, at_least=True)
+
+
+def test_what_slides_on_after_the_motion_has_level_ground_beside_it(figure):
+    """A motion that is cut short while the slope moves: its free fields go on with it to rest."""
+    results = []
+    for side in ("free_field", "dashpot"):
+        data = slope(9e3, convection=True, sliding={"time_step": 0.005, "unstable_at_rest": True})
+        data["motion"][0]["harmonic"] |= {"cycles": 1, "samples": 100}
+        data["boundary"] = {"left": side, "right": side}
+        results.append(simulate(Scene.from_dict(data)))
+    beside, without = results
+    motion = beside.scene.base_acceleration.shape[1]
+    assert sum(lapse.num_samples for lapse in beside.lapses) > motion
+    assert beside.lapses[-1].slip.rate[-1] == 0.0
+    # what is left of the vibration at the sides by then is little
+    figure("slip after the motion, free field", abs(total(beside) / total(without) - 1), 0.01)
+    assert total(beside) > 0.1

@@ -74,6 +74,12 @@ def _words(stored: StoredResult) -> Iterator[str]:
                 else ""
             )
         )
+    if told["yield_coefficient"] < 0:
+        yield (
+            "The ground did not stand at rest. A block on it runs away for as long as k_y is below "
+            "nought, and no change of the mechanism slows it down: the blocks are no estimates "
+            "of its slip then."
+        )
     if told["note"] is not None:
         ratio = number(told["yield_over_peak"])
         yield f"In no lapse is k_y/k_max less than {ratio}: {told['note']}."
