@@ -131,10 +131,19 @@ def _seam_warnings(result: Result) -> list[str]:
     found = []
     error = worst_seam_error(result.lapses)
     if error is not None and error > _SEAM_ERROR:
+        remedy = (
+            "Longer lapses, a higher solver.max_frequency or, at the Nyquist frequency, a motion "
+            "in shorter time steps make jumps smaller."
+        )
+        if any(i.slip is not None and i.slip.rate[0] > 0 for i in result.lapses[1:]):
+            remedy = (
+                "Where a mechanism gives way to the next one as it slips, accelerations of a "
+                "sample or two after the seam are not those of the ground: peaks and spectra of "
+                "what slides may come from there."
+            )
         found.append(
             f"Displacement or velocity jumps at a seam between lapses by {100 * error:.2g} % of "
-            "its peak. Longer lapses, a higher solver.max_frequency or, at the Nyquist frequency, "
-            "a motion in shorter time steps make jumps smaller."
+            f"its peak. {remedy}"
         )
     band, nyquist = energy_band(result.base_acceleration, result.dt), 0.5 / result.dt
     if error is not None and error > 0.1 * _SEAM_ERROR and 2 * band > nyquist:

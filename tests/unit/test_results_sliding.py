@@ -125,6 +125,18 @@ def test_small_slips_are_not_to_be_trusted(tmp_path, yields, slips, noted, warne
     assert len(found) == warned and all("k_y/k_max is 0.67" in text for text in found)
 
 
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_seam_where_mechanisms_change_says_what_it_does(tmp_path, moving):
+    result = make_slide()
+    lapse = result.lapses[2]
+    slip = replace(lapse.slip, rate=np.full_like(lapse.slip.rate, 0.1 if moving else 0.0))
+    lapses = [*result.lapses[:2], replace(lapse, seam_error=0.05, slip=slip), result.lapses[3]]
+    summary = write(tmp_path / "r", replace(result, lapses=tuple(lapses)))
+    [told] = [text for text in summary["warnings"] if "seam between lapses by 5 %" in text]
+    assert ("accelerations of a sample or two" in told) == moving
+    assert ("Longer lapses" in told) != moving
+
+
 def test_nothing_that_drives_it_has_no_ratio(tmp_path):
     result = make_slide()
     slip = replace(result.lapses[3].slip, driving=-np.ones(241))
