@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from scipy import sparse
 
 from fenics_hytf.domain import (
@@ -188,6 +189,8 @@ class FillingSurvey:
     def _fill(self, points: Points, share: RealArray) -> RealArray:
         if "piece" not in points.history:
             return share
+        if not self._domain.comm.allreduce(bool(np.any(points.displacement)), MPI.LOR):
+            return share  # pieces lie in the cells that they were made for
         pieces = piece_integrals(self._domain.mesh, points, np.ones((len(points), 1)))[:, 0]
         return self._domain.gather_cells(pieces) / self._volume
 
