@@ -36,7 +36,7 @@ from fenics_hytf.domain import (
 from fenics_hytf.lapse.errors import DetachedError
 from fenics_hytf.operators import GhostForm, InternalForce, gauss_sites
 from fenics_hytf.particles import Points, piece_integrals, take_out
-from fenics_hytf.scene import Scene, SceneError, default_kind
+from fenics_hytf.scene import Fault, Scene, SceneError, default_kind
 
 RealArray = npt.NDArray[np.float64]
 Cells = npt.NDArray[np.bool_]
@@ -181,6 +181,29 @@ class FillingSurvey:
             take_out(points, off[self._domain.input_cells[points.cell]], self._policy)
             share = np.where(off, 0.0, share)
         return self._weigh(share, self._fill(points, share))
+
+    def at_first(self, points: Points) -> Filling:
+        """Likewise before anything has happened: what comes off is a fault of the scene.
+
+        Args:
+            points: The points, changed in place.
+
+        Returns:
+            The filling.
+
+        Raises:
+            SceneError: Soil does not hang together with held ground and the policy is ``error``, or
+                none does.
+        """
+        try:
+            return self(points)
+        except DetachedError as error:
+            found = (
+                f"soil in {len(error.cells)} cells that hangs together with nothing held, "
+                f"the first: {', '.join(map(str, error.cells[:5]))}"
+            )
+            expected = 'soil on held ground, or points.detached = "park" or "delete"'
+            raise SceneError([Fault("mesh", found, expected)]) from error
 
     def _share(self, points: Points) -> RealArray:
         filled = np.bincount(points.cell, points.volume, self._domain.num_owned_cells)

@@ -106,7 +106,10 @@ def warnings(result: Result) -> list[str]:
             )
         lost = lapse.ledger.parked + lapse.ledger.deleted
         if lost:
-            found.append(f"Lapse {lapse.index}: {lost} points had left the mesh by its end.")
+            found.append(
+                f"Lapse {lapse.index}: {lost} points had left the mesh by its end, or come off the "
+                "ground that is held."
+            )
     if result.scene.output.water_table is not None and result.scene.mesh.size is None:
         found.append(
             "output.water_table is not used: the vertical stress, and with it the stress ratio, is "

@@ -34,7 +34,7 @@ def factor_of_safety(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> float:
     slope = Slope(scene, domain, statics)
     try:
         points = seed_points(scene, domain)
-        filling = FillingSurvey(scene, domain)(points) if scene.mesh.empty else None
+        filling = FillingSurvey(scene, domain).at_first(points) if scene.mesh.empty else None
         if filling is not None:
             statics.occupy(filling, others=True)
         statics.settle(points, survey(scene, domain, points, filling))

@@ -55,8 +55,15 @@ class Weighing:
 
         Returns:
             The ground.
+
+        Raises:
+            SceneError: At first, soil that nothing holds.
+            DetachedError: Later on.
         """
-        filling = None if self._filling is None else self._fill(self._filling(points))
+        filling = None
+        if self._filling is not None:
+            look = self._filling.at_first if at_first else self._filling
+            filling = self._fill(look(points))
         ground = survey(self._scene, self._domain, points, filling)
         self._equations.weigh(points)
         if self._statics is not None and at_first:
