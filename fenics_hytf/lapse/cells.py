@@ -210,6 +210,7 @@ class CellProbe:
         sight = sight_of(response, self._domain.comm, material.parts)
         stress = _StressHistories(sight, material, self._domain.input_cells[:owned], carried)
         of_base = [response.history(base, derivative) for derivative in range(2)]
+        slipped = [] if slip is None else [slip.at_samples(derivative) for derivative in range(3)]
         motion = np.zeros((self._domain.num_components, given.num_samples))
         motion[list(given.axes)] = given.base_acceleration
         for cells, strains, places in self._blocks:
@@ -220,10 +221,10 @@ class CellProbe:
             moved = None if slip is None else _by_cell(slip.seen_by(places), cells)
             for some, seen in _by_few(cells, sight, places):
                 histories = [sight.history(seen, derivative) for derivative in range(3)]
-                if slip is not None and moved is not None:
-                    for derivative, history in enumerate(histories):
-                        there = moved[some.start - cells.start : some.stop - cells.start]
-                        history += there[:, :, None] * slip.at_samples(derivative)
+                if moved is not None:
+                    there = moved[some.start - cells.start : some.stop - cells.start]
+                    for history, course in zip(histories, slipped, strict=True):
+                        history += there[:, :, None] * course
                 displacement, velocity, acceleration = histories
                 for history, of in zip(histories, (-of_base[0], -of_base[1], motion), strict=True):
                     history += of.astype(history.dtype)

@@ -54,7 +54,7 @@ def mesh_faults(
     except SceneError as error:
         faults += error.faults
     if scene.mesh.file is not None and "base" not in domain.boundaries:
-        found = f"no boundary named base, only {', '.join(domain.boundaries) or 'nameless ones'}"
+        found = f"no boundary named base, only {', '.join(sorted(domain.boundaries))}"
         faults.append(Fault("mesh.file", found, "one named base, which the ground stands on"))
     faults += _locking_faults(scene, domain)
     faults += _sliding_faults(scene, domain)

@@ -120,6 +120,13 @@ def test_a_file_that_names_two_regions_alike(check):
     assert "groups of dimension 2 and 2 in a.msh that are all named 'clay'" in check()["mesh.file"]
 
 
+def test_sides_that_stand_on_nothing(check):
+    # Held across the sides and shaken along them, the section would run, and fall.
+    section([*SOILS, ("left", 1, [4, 7]), ("right", 1, [2, 5])])
+    sides = SCENE.replace('base = "rigid"', 'left = "roller"\nright = "roller"')
+    assert "no boundary named base, only left, right" in check(scene=sides)["mesh.file"]
+
+
 @VERSIONS
 def test_groups_of_which_none_has_a_name(check, version):
     section([("", 2, [1, 2])], MshFileVersion=version)

@@ -572,6 +572,12 @@ def test_the_report_says_what_cannot_be_trusted(tmp_path):
     )
 
 
+@pytest.mark.parametrize("first", [-0.1, 0.1])
+def test_blocks_on_ground_that_does_not_stand_are_no_estimates(tmp_path, first):
+    text = text_of(make_slide(yields=(first, 0.1, 0.1, 0.1)), tmp_path / "r")
+    assert ("the blocks are no estimates of its slip" in text) == (first < 0)
+
+
 def test_soils_of_a_slide_are_escaped(tmp_path):
     soil = "<i>sand</i>"
     result = make_slide()
