@@ -13,7 +13,7 @@ import basix.ufl
 import numpy as np
 import numpy.typing as npt
 from dolfinx.fem import FunctionSpace, functionspace
-from dolfinx.mesh import Mesh, create_mesh, locate_entities_boundary
+from dolfinx.mesh import Mesh, create_mesh, entities_to_geometry, locate_entities_boundary
 from mpi4py import MPI
 
 from fenics_hytf import _compat
@@ -117,6 +117,16 @@ class Domain:
         middle = basix.geometry(reference).mean(axis=0, keepdims=True)
         volume = basix.cell.volume(reference) * jacobian_determinants(self.mesh, middle)[:, 0]
         return np.asarray(np.abs(volume) ** (1 / self.gdim))
+
+    def shortest_edge(self) -> float:
+        """Length of the shortest edge of all cells [m] (collective)."""
+        mesh = self.mesh
+        mesh.topology.create_entities(1)
+        mesh.topology.create_connectivity(1, mesh.topology.dim)
+        edges = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
+        ends = mesh.geometry.x[entities_to_geometry(mesh, 1, edges)]
+        mine = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min(initial=np.inf)
+        return float(self.comm.allreduce(float(mine), MPI.MIN))
 
     def centroids(self) -> npt.NDArray[np.float64]:
         """Mean of the geometry nodes of every cell, in the order of the input (collective).

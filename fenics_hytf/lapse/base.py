@@ -19,7 +19,7 @@ from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.material import rock_factors
 from fenics_hytf.lapse.response import Response, Spectra
-from fenics_hytf.operators import boundary_area, constrained_rows, mean_rows
+from fenics_hytf.operators import boundary_area, constrained_rows, evaluate, mean_rows
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]
@@ -70,13 +70,7 @@ class BaseProbe:
         """
         if self._rows is None:
             return np.zeros(self._domain.num_components)
-        x, mean = self._rows.createVecs()
-        x.array[:] = unknowns
-        self._rows.mult(x, mean)
-        total = self._domain.comm.allreduce(mean.array_r.real.copy())
-        x.destroy()
-        mean.destroy()
-        return np.asarray(total)
+        return np.asarray(self._domain.comm.allreduce(evaluate(self._rows, unknowns)))
 
 
 def within_motion(response: Response, base: Spectra) -> RealArray:

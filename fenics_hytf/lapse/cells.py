@@ -20,7 +20,13 @@ from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.response import Response, Spectra
 from fenics_hytf.lapse.sight import Sight, sight_of
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.operators import constrained_rows, displacement_rows, split_rows, strain_rows
+from fenics_hytf.operators import (
+    constrained_rows,
+    displacement_rows,
+    evaluate,
+    split_rows,
+    strain_rows,
+)
 from fenics_hytf.particles import cell_centres, gradient_matrices, transfer_matrix
 
 RealArray = npt.NDArray[np.float64]
@@ -176,13 +182,8 @@ class CellProbe:
         """
         found = np.zeros((self._domain.num_owned_cells, 1))
         for cells, rows, _ in self._blocks:
-            x, seen = rows.createVecs()
-            x.array[:] = unknowns
-            rows.mult(x, seen)
-            strain = _by_cell(seen.array_r.real, cells)[:, :, None]
+            strain = _by_cell(evaluate(rows, unknowns), cells)[:, :, None]
             found[cells, 0] = peak_shear_strain(strain, self._convention)
-            x.destroy()
-            seen.destroy()
         return self._gather(found)[:, 0]
 
     def peaks(

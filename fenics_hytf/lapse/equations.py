@@ -30,7 +30,7 @@ from fenics_hytf.frequency import (
     constant,
     radiation,
 )
-from fenics_hytf.lapse.filling import Filling
+from fenics_hytf.lapse.filling import Filling, assemble_stiffness
 from fenics_hytf.lapse.ground import Ground
 from fenics_hytf.lapse.inertia import Inertia
 from fenics_hytf.lapse.material import ElasticConstants, Material, Part, rock_factors
@@ -212,6 +212,35 @@ class Equations:
         self.inertia.weigh(M, self.T, held)
         M.destroy()
 
+    def momentum(self, points: Points, motion: RealArray) -> PETSc.Vec:
+        """Momentum SᵀM_p v of what points carry, on the unknowns (collective).
+
+        Args:
+            points: The points, as they were weighed.
+            motion: v of each, or a displacement or mechanism, shape
+                ``(len(points), num_components)``.
+
+        Returns:
+            Tᵀ SᵀM_p v; the caller destroys it.
+        """
+        S = transfer_matrix(points, self._domain.V)
+        return self.unknowns.collect((S.T @ (points.mass[:, None] * motion)).ravel())
+
+    def field_of(self, points: Points, motion: RealArray) -> RealArray:
+        """The nodal field of the same momentum as what points carry (collective).
+
+        Args:
+            points: As for :meth:`momentum`.
+            motion: As for :meth:`momentum`.
+
+        Returns:
+            At this rank's nodes, ghosts included, shape ``(num_local_nodes, num_components)``.
+        """
+        momentum = self.momentum(points, motion)
+        field = self.unknowns.expand(self.inertia.accelerate(momentum))
+        momentum.destroy()
+        return field
+
     def _hold_loose(self, ghost: GhostForm, points: Points) -> PETSc.Mat:
         """M and a ghost of its size, for nodes that hardly any point weighs on.
 
@@ -269,12 +298,9 @@ class Equations:
         """K of a part of the law, and K_G of loose cells, which so is damped as the ground is."""
         cells = self._domain.input_cells
         lame, shear = part.constants.at(cells)
-        if self.filling is None or self._at_points is None:
-            self._elastic.assemble(self._K, lame, shear)
-        else:
-            whole = self.filling.whole[cells]
-            self._elastic.assemble(self._K, whole * lame, whole * shear)
-            self._at_points.add_stiffness(self._K, lame, shear)
+        assemble_stiffness(
+            self._domain, self._K, self._elastic, self._at_points, self.filling, lame, shear
+        )
         self._assemblies["elasticity"] += 1
         if self._ghost is not None:
             across = self._domain.num_components == 1

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_hytf.domain import (
@@ -34,7 +35,7 @@ from fenics_hytf.domain import (
     normal_axis,
 )
 from fenics_hytf.lapse.errors import DetachedError
-from fenics_hytf.operators import GhostForm, InternalForce, gauss_sites
+from fenics_hytf.operators import ElasticForm, GhostForm, InternalForce, gauss_sites
 from fenics_hytf.particles import Points, piece_integrals, take_out
 from fenics_hytf.scene import Fault, Scene, SceneError, default_kind
 
@@ -113,6 +114,34 @@ class Filling:
         """Let forces be integrated over what is filled."""
         local = domain.input_cells
         force.occupy(points, self.whole[local], self.edge[local])
+
+
+def assemble_stiffness(
+    domain: Domain,
+    matrix: PETSc.Mat,
+    elastic: ElasticForm,
+    force: InternalForce | None,
+    filling: Filling | None,
+    lame_lambda: RealArray,
+    shear_modulus: RealArray,
+) -> None:
+    """Assemble the elastic stiffness of what is filled (collective).
+
+    Args:
+        domain: The domain.
+        matrix: On the nodes, with the pattern of the cells; overwritten.
+        elastic: The form of whole cells.
+        force: Integrates over cells that are filled in part, as it was last told which.
+        filling: How far points fill the cells; ``None`` where all are full.
+        lame_lambda: λ of each local cell [Pa], shape ``(num_local_cells,)``.
+        shear_modulus: G likewise.
+    """
+    if filling is None or force is None:
+        elastic.assemble(matrix, lame_lambda, shear_modulus)
+        return
+    whole = filling.whole[domain.input_cells]
+    elastic.assemble(matrix, whole * lame_lambda, whole * shear_modulus)
+    force.add_stiffness(matrix, lame_lambda, shear_modulus)
 
 
 def cell_integrals(

@@ -44,6 +44,7 @@ from fenics_hytf.operators import (
     TractionForm,
     constrained_rows,
     displacement_rows,
+    evaluate,
 )
 from fenics_hytf.particles import (
     Sites,
@@ -222,19 +223,15 @@ class FreeField:
 
     def _force_of(self, matrices: list[tuple[PETSc.Mat, complex]], field: RealArray) -> PETSc.Vec:
         """Nodal forces of matrices and a field on the column's unknowns."""
-        there, unknowns = self._rows.createVecLeft(), self._rows.createVecRight()
-        unknowns.array[:] = field
-        self._rows.mult(unknowns, there)
         total = self._C.createVecLeft()
-        self._add_products(matrices, there.array_r.reshape(len(self._side.nodes), -1), total)
-        there.destroy()
-        unknowns.destroy()
+        there = evaluate(self._rows, field).reshape(len(self._side.nodes), -1)
+        self._add_products(matrices, there, total)
         return total
 
     def _add_products(
         self,
         matrices: list[tuple[PETSc.Mat, complex]],
-        motion: npt.NDArray[np.complex128],
+        motion: RealArray | ComplexArray,
         nodal: PETSc.Vec,
     ) -> None:
         """Add Σ factor · matrix · motion of the nodes on the side to nodal forces."""

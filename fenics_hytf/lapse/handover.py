@@ -38,7 +38,7 @@ from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
+from fenics_hytf.lapse.starts import largest, product, start_accelerations, start_columns
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.motion import (
     LapseRecord,
@@ -103,9 +103,7 @@ class Handover:
         self._velocity: RealArray
         self._statics = statics if scene.effects.convection else None
         self._imbalance: PETSc.Vec | None = None
-        # φ on the unknowns, and the rate at which a mechanism slips as the lapse begins: its
-        # dashpots pull at the ground, −Cφ λ̇₀/s.
-        self.steady_slip: tuple[RealArray, float] | None = None
+        self._slipping: tuple[RealArray, float] | None = None  # φ on the unknowns, and λ̇₀
         self._solved: LapseEquations
 
     def excite(self, segment: Segment) -> Excitation:
@@ -121,6 +119,15 @@ class Handover:
             self._start,
         )
 
+    def slip_on(self, mechanism: RealArray, rate: float) -> None:
+        """Take note of what slips as the lapse begins: its dashpots pull at the ground, −Cφ λ̇₀/s.
+
+        Args:
+            mechanism: φ on this rank's unknowns, shape ``(num_local_unknowns,)``.
+            rate: λ̇₀ [m/s].
+        """
+        self._slipping = mechanism, rate
+
     def begin(self, points: Points, excitation: Excitation) -> None:
         """Read what the points carry, at the Gauss points and in the middle of cells."""
         self._excitation = excitation
@@ -131,10 +138,8 @@ class Handover:
             centres = resample_matrix(mesh, points, degree, self._centres)
             self._resampling = [self._force.resampling(points), centres]
         self._at_gauss, self._at_centres = (State.of(points, R) for R in self._resampling)
-        S = transfer_matrix(points, self._domain.V)
         self.destroy()
-        momentum = S.T @ (points.mass[:, None] * points["dynamic_velocity"])
-        found = self._equations.unknowns.collect(momentum.ravel())
+        found = self._equations.momentum(points, points["dynamic_velocity"])
         # The momentum of the nodes' velocity: that of the points but for what no node can have.
         self._velocity = self._equations.inertia.accelerate(found)
         self._momentum = product([(self._equations.mass, 1.0)], self._velocity, like=found)
@@ -165,8 +170,8 @@ class Handover:
     def _constant_force(self, equations: LapseEquations) -> PETSc.Vec | None:
         """What acts throughout the lapse, or ``None`` if nothing does."""
         force = None if self._imbalance is None else self._imbalance.copy()
-        if self.steady_slip is not None and self.steady_slip[1] and equations.drag:
-            phi, rate = self.steady_slip
+        if self._slipping is not None and self._slipping[1] and equations.drag:
+            phi, rate = self._slipping
             assert self._momentum is not None
             factors = [(C, -rate * factor) for C, factor in equations.drag]
             drag = product(factors, phi, like=self._momentum)
@@ -233,14 +238,9 @@ class Handover:
     def _columns(
         self, equations: LapseEquations, velocity: RealArray, force: PETSc.Vec, rate: PETSc.Vec
     ) -> Columns:
-        viscous = [(C, 1.0) for C in equations.viscous]
-        with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
-            a = accelerate(force, rate)
-            slowed = product(viscous, a, like=rate)
-            slowed.aypx(-1.0, rate)
-            j = accelerate(slowed)
-        slowed.destroy()
-        return start_columns(self._start, [0 * velocity, velocity, a, j])
+        highest = float(self._excitation.omega.max())
+        accelerations = start_accelerations(equations, highest, force, rate)
+        return start_columns(self._start, [0 * velocity, velocity, *accelerations])
 
     @property
     def motion_to_end(self) -> RealArray:

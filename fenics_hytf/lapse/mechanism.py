@@ -30,13 +30,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import DynamicSystem, SymmetricFactorisation
 from fenics_hytf.lapse.errors import LapseError
+from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.operators import SecantForm
 
 RealArray = npt.NDArray[np.float64]
@@ -127,7 +127,7 @@ class MechanismSearch:
 
     def find(
         self,
-        T: PETSc.Mat,
+        unknowns: Unknowns,
         weight: RealArray,
         strength: RealArray,
         gravity: PETSc.Vec | None,
@@ -137,7 +137,7 @@ class MechanismSearch:
         """Find the mechanism that yields first under a driving force (collective).
 
         Args:
-            T: Constraint matrix; every unknown belongs to a cell that is filled.
+            unknowns: The unknowns, each of a cell that is filled.
             weight: Part of each local cell that is filled, 0 to 1, shape ``(num_local_cells,)``.
             strength: Shear strength τ_f [Pa] of local cells, shape ``(num_local_cells,)``, or at
                 the Gauss points of owned cells, shape ``(num_owned_cells, num_gauss_points)``.
@@ -154,7 +154,9 @@ class MechanismSearch:
             MechanismError: The functional does not settle.
             FactorisationError: Unknowns without soil.
         """
-        search = _Search(self, T, weight, strength, gravity, driving)
+        search = _Search(
+            self._domain, self._form, self._K, unknowns, weight, strength, gravity, driving
+        )
         try:
             return search.run(start)
         finally:
@@ -162,7 +164,7 @@ class MechanismSearch:
             search.destroy()
 
     def factor_of_safety(
-        self, T: PETSc.Mat, weight: RealArray, strength: RealArray, gravity: PETSc.Vec
+        self, unknowns: Unknowns, weight: RealArray, strength: RealArray, gravity: PETSc.Vec
     ) -> float:
         """The factor by which the strength exceeds what the ground needs at rest (collective).
 
@@ -171,7 +173,7 @@ class MechanismSearch:
         times the strength: no factor of safety follows from that.
 
         Args:
-            T: As for :meth:`find`, as are the others.
+            unknowns: As for :meth:`find`, as are the others.
             weight: Part of each local cell that is filled.
             strength: Shear strength.
             gravity: Weight on the unknowns.
@@ -184,7 +186,7 @@ class MechanismSearch:
             MechanismError: As :meth:`find`.
             FactorisationError: As :meth:`find`.
         """
-        found = self.find(T, weight, strength, None, gravity)
+        found = self.find(unknowns, weight, strength, None, gravity)
         sheared = found.dissipation / found.driving / found.functional[-1]
         return found.yield_coefficient if sheared > _SHEARED else np.inf
 
@@ -194,15 +196,17 @@ class _Search:
 
     def __init__(
         self,
-        owner: MechanismSearch,
-        T: PETSc.Mat,
+        domain: Domain,
+        form: SecantForm,
+        K: PETSc.Mat,
+        unknowns: Unknowns,
         weight: RealArray,
         strength: RealArray,
         gravity: PETSc.Vec | None,
         driving: PETSc.Vec,
     ) -> None:
-        self._domain, self._form, self._K, self._T = owner._domain, owner._form, owner._K, T
-        self._weight = weight
+        self._domain, self._form, self._K = domain, form, K
+        self._unknowns, self._weight = unknowns, weight
         owned = self._domain.num_owned_cells
         self._volume = self._form.volume * weight[:owned, None]
         strength = strength[:, None] if strength.ndim == 1 else strength
@@ -213,7 +217,7 @@ class _Search:
         self._gravity = 0 * self._driving if gravity is None else gravity.array_r.real.copy()
         if self._work(self._driving, self._driving) == 0:
             raise ValueError("found no driving force; expected one that moves an unknown")
-        self._unknowns, self._nodes = T.createVecs()
+        self._solution = driving.duplicate()
         self.factorisations = 0
 
     def _require_strength(self) -> None:
@@ -225,14 +229,13 @@ class _Search:
             )
 
     def destroy(self) -> None:
-        """Destroy the vectors."""
-        self._unknowns.destroy()
-        self._nodes.destroy()
+        """Destroy the vector."""
+        self._solution.destroy()
 
     def run(self, start: RealArray | None) -> Mechanism:
         """Search."""
         self._form.assemble(self._K, np.ones_like(self._volume), self._weight)
-        K = self._K.ptap(self._T)
+        K = self._K.ptap(self._unknowns.T)
         try:
             with SymmetricFactorisation(DynamicSystem(K, K)) as factorisation:
                 self._constrained, self._factorisation = K, factorisation
@@ -244,7 +247,7 @@ class _Search:
 
     def _mechanism(self, flow: RealArray, functional: Sequence[float]) -> Mechanism:
         """The flow brought to the length 1."""
-        nodal = self._expand(flow)
+        nodal = self._unknowns.expand(flow)
         longest = float(np.linalg.norm(nodal, axis=1).max(initial=0.0))
         longest = self._domain.comm.allreduce(longest, MPI.MAX)
         shear = self._dissipation(self._form.shear_strain(nodal)[:, :, None])
@@ -290,12 +293,12 @@ class _Search:
     def _minimise(self, shear_modulus: RealArray, forces: Sequence[PETSc.Vec]) -> RealArray:
         """u_g + k u₁ with moduli at the Gauss points; forces are the driving one and gravity."""
         self._form.assemble(self._K, shear_modulus, self._weight)
-        self._K.ptap(self._T, result=self._constrained)
+        self._K.ptap(self._unknowns.T, result=self._constrained)
         self._factorisation.factorise(0.0)
         solutions = []
         for force in forces:
-            self._factorisation.backsolve(force, self._unknowns)
-            solutions.append(self._unknowns.array_r.real.copy())
+            self._factorisation.backsolve(force, self._solution)
+            solutions.append(self._solution.array_r.real.copy())
         driven, *weighed = solutions
         minimum = sum(weighed, np.zeros_like(driven))
         k = (1 - self._work(self._driving, minimum)) / self._work(self._driving, driven)
@@ -327,17 +330,9 @@ class _Search:
         """Unknowns of a nodal field, scaled to unit work; none where it does not do any."""
         if start is None:
             return None
-        # Each unknown is the mean of the displacements that it moves.
-        total, count = map(self._gather, (start.ravel(), np.ones(start.size)))
-        flow = total / count
+        flow = self._unknowns.restrict(start)
         work = self._work(self._driving, flow)
         return np.asarray(flow / work) if work > 0 else None
-
-    def _gather(self, nodal: RealArray) -> RealArray:
-        """Sum over the displacements that each unknown moves, shape ``(num_local_unknowns,)``."""
-        self._nodes.array[:] = nodal[: self._nodes.getLocalSize()]
-        self._T.multTranspose(self._nodes, self._unknowns)
-        return self._unknowns.array_r.real.copy()
 
     def _moduli(self, squares: RealArray, smoothing: float) -> RealArray:
         return self._strength / np.sqrt(squares + smoothing**2)
@@ -347,7 +342,7 @@ class _Search:
         return _SMOOTHING * float(self._domain.comm.allreduce(largest, MPI.MAX))
 
     def _strain(self, flow: RealArray) -> RealArray:
-        return self._form.strain(self._expand(flow))
+        return self._form.strain(self._unknowns.expand(flow))
 
     def _dissipation(self, strain: RealArray) -> float:
         power = self._strength * np.linalg.norm(strain, axis=2)
@@ -358,15 +353,6 @@ class _Search:
 
     def _sum(self, mine: RealArray) -> RealArray:
         return np.asarray(self._domain.comm.allreduce(mine))
-
-    def _expand(self, flow: RealArray) -> RealArray:
-        """T q at this rank's nodes, ghosts included, shape ``(num_local_nodes, gdim)``."""
-        self._unknowns.array[:] = flow
-        self._T.mult(self._unknowns, self._nodes)
-        u = Function(self._domain.V)
-        u.x.array[: self._nodes.getLocalSize()] = self._nodes.array_r
-        u.x.scatter_forward()
-        return u.x.array.real.reshape(-1, self._domain.num_components).copy()
 
 
 def _solve(A: RealArray, b: RealArray) -> RealArray:

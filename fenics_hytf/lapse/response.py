@@ -24,7 +24,7 @@ from fenics_hytf.frequency import Columns, Sweep
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Part
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.operators import constrained_rows, displacement_rows
+from fenics_hytf.operators import constrained_rows, displacement_rows, evaluate
 from fenics_hytf.particles import Sites, transfer_matrix
 
 RealArray = npt.NDArray[np.float64]
@@ -272,12 +272,7 @@ class ReceiverProbe:
         Returns:
             Shape ``(num_receivers, num_components)``.
         """
-        x, there = self._rows.createVecs()
-        x.array[:] = unknowns
-        self._rows.mult(x, there)
-        mine = there.array_r.real.reshape(-1, self._domain.num_components).copy()
-        x.destroy()
-        there.destroy()
+        mine = evaluate(self._rows, unknowns).reshape(-1, self._domain.num_components)
         return np.asarray(self._gather(mine)[0])
 
     def _gather(self, *mine: npt.NDArray[Any]) -> list[npt.NDArray[Any]]:

@@ -14,9 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.mesh import entities_to_geometry
-from mpi4py import MPI
-from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.lapse.continuity import Solve
@@ -66,7 +63,7 @@ class Sliding:
         self._handover, self._slope = handover, Slope(scene, domain, statics)
         self._settings, self._g = scene.effects.sliding, scene.effects.gravity.acceleration
         moves = scene.effects.convection
-        self._most_slip = self._settings.new_mechanism * cell_size(domain) if moves else None
+        self._most_slip = self._settings.new_mechanism * domain.shortest_edge() if moves else None
         self.state: SlipState | None = None
         self._mechanism: Mechanism
         self._unknowns: RealArray
@@ -103,7 +100,7 @@ class Sliding:
         else:
             self._mechanism = self._next(points, self.state)
         self.state = self._give_way(points, self.state)
-        self._handover.steady_slip = (self._unknowns, self.state.rate)
+        self._handover.slip_on(self._unknowns, self.state.rate)
 
     def _first(self) -> tuple[Mechanism, SlipState]:
         """The mechanism with the least k_y, over both senses of every horizontal motion."""
@@ -121,20 +118,12 @@ class Sliding:
 
     def _next(self, points: Points, state: SlipState) -> Mechanism:
         """The mechanism now, sought from where the last one has moved to."""
-        momentum = self._momentum(points)
-        start = self._equations.unknowns.expand(self._equations.inertia.accelerate(momentum))
-        momentum.destroy()
+        start = self._equations.field_of(points, points["mechanism"])
         return self._find(state.axis, state.sense, start)
 
     def _find(self, axis: int, sense: int, start: RealArray | None = None) -> Mechanism:
         inertia = self._equations.inertia.influence[self._equations.axes.index(axis)]
         return self._slope.find(inertia, sense * self._g, start)
-
-    def _momentum(self, points: Points) -> PETSc.Vec:
-        """SᵀM_p φ of the mechanism that points carry; the caller destroys it."""
-        S = transfer_matrix(points, self._domain.V)
-        momentum = S.T @ (points.mass[:, None] * points["mechanism"])
-        return self._equations.unknowns.collect(momentum.ravel())
 
     def _give_way(self, points: Points, state: SlipState) -> SlipState:
         """What the old mechanism has of the motion of the new one slips on, the rest vibrates."""
@@ -142,7 +131,7 @@ class Sliding:
         at_points = transfer_matrix(points, self._domain.V) @ self._mechanism.field
         rate = state.rate
         if rate:
-            momentum = self._momentum(points)
+            momentum = self._equations.momentum(points, points["mechanism"])
             phi = momentum.duplicate()
             phi.array[:] = self._unknowns
             M_phi = product([(self._equations.mass, 1.0)], self._unknowns, like=phi)
@@ -170,27 +159,16 @@ class Sliding:
         """
         assert self.state is not None
         with LapseSlip(
-            self._mechanism,
-            self._unknowns,
-            self.state,
-            response,
-            equations,
-            self._equations.inertia.forces,
-            self._handover.motion_between,
-            self._g * self._mechanism.yield_coefficient,
-            self._settings.time_step,
+            mechanism=self._mechanism,
+            unknowns=self._unknowns,
+            state=self.state,
+            response=response,
+            equations=equations,
+            inertia=self._equations.inertia.forces,
+            motion=self._handover.motion_between,
+            yield_acceleration=self._g * self._mechanism.yield_coefficient,
+            time_step=self._settings.time_step,
         ) as lapse:
             slipped = lapse.march(kernel, self._most_slip)
             self.state = slipped.after
             return lapse.excited(slipped, solve, self._handover.start_from), slipped
-
-
-def cell_size(domain: Domain) -> float:
-    """The smallest edge of all cells [m] (collective)."""
-    mesh = domain.mesh
-    mesh.topology.create_entities(1)
-    mesh.topology.create_connectivity(1, mesh.topology.dim)
-    edges = np.arange(mesh.topology.index_map(1).size_local, dtype=np.int32)
-    ends = mesh.geometry.x[entities_to_geometry(mesh, 1, edges)]
-    mine = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).min(initial=np.inf)
-    return float(domain.comm.allreduce(float(mine), MPI.MIN))

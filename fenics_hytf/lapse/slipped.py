@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from fenics_hytf.lapse.mechanism import Mechanism
 from fenics_hytf.motion import SlipHistory
+from fenics_hytf.operators import evaluate
 
 RealArray = npt.NDArray[np.float64]
 
@@ -106,13 +107,7 @@ class Slipped:
 
     def seen_by(self, rows: PETSc.Mat) -> RealArray:
         """This rank's rows of a matrix times φ, shape ``(num_local_rows,)``."""
-        phi, seen = rows.createVecs()
-        phi.array[:] = self.unknowns
-        rows.mult(phi, seen)
-        values = seen.array_r.real.copy()
-        phi.destroy()
-        seen.destroy()
-        return values
+        return evaluate(rows, self.unknowns)
 
     def added_to(self, rows: PETSc.Mat, derivative: int = 0) -> RealArray:
         """What slip adds to histories of displacement or a derivative.

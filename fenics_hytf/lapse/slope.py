@@ -112,8 +112,9 @@ class Slope:
             MechanismError: No mechanism was found.
         """
         assert self._gravity is not None
-        T = self._statics.unknowns.T
-        safety = self._search.factor_of_safety(T, self._weight, self._strength, self._gravity)
+        safety = self._search.factor_of_safety(
+            self._statics.unknowns, self._weight, self._strength, self._gravity
+        )
         if safety < 1 and not self._settings.unstable_at_rest:
             found = f"a slope with a factor of safety of {safety:.3g} at rest"
             expected = "more than 1 before it is shaken, or unstable_at_rest = true to let it go"
@@ -134,11 +135,13 @@ class Slope:
         Raises:
             MechanismError: None was found.
         """
-        T = self._statics.unknowns.T
-        driving = T.createVecRight()
-        T.multTranspose(inertia, driving)
+        unknowns = self._statics.unknowns
+        driving = unknowns.T.createVecRight()
+        unknowns.T.multTranspose(inertia, driving)
         driving.scale(scale)
         try:
-            return self._search.find(T, self._weight, self._strength, self._gravity, driving, start)
+            return self._search.find(
+                unknowns, self._weight, self._strength, self._gravity, driving, start
+            )
         finally:
             driving.destroy()

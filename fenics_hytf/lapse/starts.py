@@ -86,6 +86,29 @@ class StartSolver:
         return np.asarray(values)
 
 
+def start_accelerations(
+    equations: LapseEquations, highest: float, force: PETSc.Vec, rate: PETSc.Vec
+) -> tuple[RealArray, RealArray]:
+    """Acceleration and its rate as a lapse begins (collective).
+
+    Args:
+        equations: The equations.
+        highest: Highest circular frequency of the lines [rad/s].
+        force: What is out of balance.
+        rate: Its rate but for the viscous forces that the acceleration brings.
+
+    Returns:
+        Each on this rank's unknowns, shape ``(num_local_unknowns,)``.
+    """
+    with StartSolver(equations, highest) as accelerate:
+        acceleration = accelerate(force, rate)
+        slowed = product([(C, 1.0) for C in equations.viscous], acceleration, like=rate)
+        slowed.aypx(-1.0, rate)
+        jerk = accelerate(slowed)
+        slowed.destroy()
+    return acceleration, jerk
+
+
 def _times(factor: float) -> ScalarFunction:
     return lambda s: factor
 

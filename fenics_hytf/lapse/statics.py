@@ -17,14 +17,13 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from dolfinx.fem import Function
 from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import DynamicSystem, SymmetricFactorisation, constant
 from fenics_hytf.lapse.errors import BalanceError
-from fenics_hytf.lapse.filling import Filling
+from fenics_hytf.lapse.filling import Filling, assemble_stiffness
 from fenics_hytf.lapse.ground import Ground
 from fenics_hytf.lapse.material import ElasticConstants, elastic_constants
 from fenics_hytf.lapse.unknowns import Unknowns
@@ -95,23 +94,22 @@ class Statics:
             self._unknowns = Unknowns(self._domain, self._supports)
         return self._unknowns
 
-    def occupy(self, filling: Filling, others: bool) -> None:
+    def occupy(self, filling: Filling) -> None:
         """Take note of which cells are filled, and how far (collective).
 
         Args:
             filling: The filling.
-            others: Whether other cells are filled, or loose, than before.
         """
-        if others and self._unknowns is not None:
-            self.destroy()
-            self._unknowns, self._K, self._K_G = None, None, None
-        if self._unknowns is None:
-            bare = filling.bare_nodes(self._domain)
-            self._unknowns = Unknowns(self._domain, self._supports, bare=bare)
-            self._ghost = filling.ghost(self._domain, _LIGHTLY)
-        elif self._ghost is not None:
-            filling.loosen(self._ghost, self._domain)
-        self._filling = filling
+        before, self._filling = self._filling, filling
+        if before is not None and filling.same_cells(before):
+            if self._ghost is not None:
+                filling.loosen(self._ghost, self._domain)
+            return
+        self.destroy()
+        bare = filling.bare_nodes(self._domain)
+        self._unknowns = Unknowns(self._domain, self._supports, bare=bare)
+        self._ghost = filling.ghost(self._domain, _LIGHTLY)
+        self._K, self._K_G = None, None
 
     def settle(self, points: Points, ground: Ground) -> None:
         """Give points their first stress (collective).
@@ -236,17 +234,14 @@ class Statics:
         return total, left
 
     def _factorised(self, lame: RealArray, shear: RealArray) -> SymmetricFactorisation:
-        T, cells = self.unknowns.T, self._domain.input_cells
+        T = self.unknowns.T
         nodal = (self._ghost or self._elastic).create_matrix()
         if self._ghost is not None:
             self._ghost.assemble(nodal, ElasticConstants(lame, shear).youngs_modulus)
             self._K_G = nodal.ptap(T, result=self._K_G)
-        if self._filling is None:
-            self._elastic.assemble(nodal, lame, shear)
-        else:
-            whole = self._filling.whole[cells]
-            self._elastic.assemble(nodal, whole * lame, whole * shear)
-            self._force.add_stiffness(nodal, lame, shear)
+        assemble_stiffness(
+            self._domain, nodal, self._elastic, self._force, self._filling, lame, shear
+        )
         self._K = nodal.ptap(T, result=self._K)
         nodal.destroy()
         terms = [(K, constant) for K in (self._K, self._K_G) if K is not None]
@@ -286,13 +281,6 @@ class Statics:
             This rank's share at its nodes, to be summed over ranks, ghosts included, components
             fastest [N, in 2D N/m].
         """
-        free = Function(self._domain.V)
-        rows, ones = self.unknowns.T.createVecLeft(), self.unknowns.T.createVecRight()
-        ones.set(1.0)
-        self.unknowns.T.mult(ones, rows)
-        free.x.array[: rows.getLocalSize()] = rows.array_r
-        free.x.scatter_forward()
-        rows.destroy()
-        ones.destroy()
+        free = self.unknowns.expand(np.ones(self.unknowns.num_local))
         left = self.weight_of(points) - self._internal(points, self._resampling(points))
-        return left * free.x.array.real
+        return left * free.ravel()

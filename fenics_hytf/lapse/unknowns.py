@@ -12,6 +12,7 @@ from dolfinx.fem import Function
 from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain, constraint_matrix
+from fenics_hytf.operators import evaluate
 
 RealArray = npt.NDArray[np.float64]
 
@@ -81,14 +82,10 @@ class Unknowns:
             At the local nodes, ghosts included, shape
             ``(num_local_nodes, num_components)``.
         """
-        unknowns, nodes = self.T.createVecs()
-        unknowns.array[:] = q
-        self.T.mult(unknowns, nodes)
+        owned = evaluate(self.T, q)
         u = Function(self._domain.V)
-        u.x.array[: nodes.getLocalSize()] = nodes.array_r
+        u.x.array[: len(owned)] = owned
         u.x.scatter_forward()
-        unknowns.destroy()
-        nodes.destroy()
         return u.x.array.real.reshape(-1, self._domain.num_components).copy()
 
     def restrict(self, u: RealArray) -> RealArray:

@@ -29,7 +29,7 @@ from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.lapse.starts import StartSolver, largest, product, start_columns
+from fenics_hytf.lapse.starts import largest, product, start_accelerations, start_columns
 from fenics_hytf.motion import (
     LapseRecord,
     Segment,
@@ -111,9 +111,7 @@ class WholeRecord:
         points, S = self._points, transfer_matrix(self._points, self._domain.V)
         carried = points["dynamic_velocity" if derivative else "dynamic_displacement"]
         nodal = self._equations.unknowns.expand(driven.unknowns_at(0.0, derivative))
-        return self._equations.unknowns.collect(
-            (S.T @ (points.mass[:, None] * (carried - S @ nodal))).ravel()
-        )
+        return self._equations.momentum(points, carried - S @ nodal)
 
     def _starts(self, equations: LapseEquations, w: PETSc.Vec, rate: PETSc.Vec) -> Columns:
         """Coefficients of the start functions of the free vibration, from its two momenta."""
@@ -126,13 +124,11 @@ class WholeRecord:
         force = product(stiff, displacement, like=w)
         force.axpy(1.0, slowed := product(viscous, velocity, like=w))
         change = product(stiff, velocity, like=w)
-        with StartSolver(equations, float(self._excitation.omega.max())) as accelerate:
-            acceleration = accelerate(force, change)
-            change.axpy(1.0, damped := product(viscous, acceleration, like=w))
-            jerk = accelerate(change)
-        for vector in (force, slowed, change, damped):
+        highest = float(self._excitation.omega.max())
+        accelerations = start_accelerations(equations, highest, force, change)
+        for vector in (force, slowed, change):
             vector.destroy()
-        return start_columns(self._start, [displacement, velocity, acceleration, jerk])
+        return start_columns(self._start, [displacement, velocity, *accelerations])
 
     def carried(self, material: Material) -> None:
         """Nothing: the response is total."""

@@ -12,6 +12,7 @@ from fenics_hytf.operators.rows import (
     NORMAL_STRAINS,
     constrained_rows,
     displacement_rows,
+    evaluate,
     split_rows,
     strain_rows,
 )
@@ -33,6 +34,7 @@ __all__ = [
     "boundary_area",
     "constrained_rows",
     "displacement_rows",
+    "evaluate",
     "gauss_sites",
     "isotropic_stress",
     "mean_rows",

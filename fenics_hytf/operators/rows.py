@@ -11,10 +11,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 from petsc4py import PETSc
 from scipy import sparse
 
 from fenics_hytf.domain import Domain
+
+RealArray = npt.NDArray[np.float64]
 
 NORMAL_STRAINS = {2: 0, 3: 2, 6: 3}
 """How many of so many Voigt components are normal ones; they come first."""
@@ -123,6 +126,25 @@ def constrained_rows(domain: Domain, local: sparse.csr_matrix, T: PETSc.Mat) -> 
     rows.destroy()
     product.destroy()
     return result
+
+
+def evaluate(rows: PETSc.Mat, unknowns: RealArray) -> RealArray:
+    """What rows make of a field at one instant (collective).
+
+    Args:
+        rows: Distributed matrix, real, a column an unknown.
+        unknowns: This rank's, shape ``(num_local_unknowns,)``.
+
+    Returns:
+        This rank's rows, shape ``(num_local_rows,)``.
+    """
+    x, values = rows.createVecs()
+    x.array[:] = unknowns
+    rows.mult(x, values)
+    found = values.array_r.real.copy()
+    x.destroy()
+    values.destroy()
+    return np.asarray(found)
 
 
 def split_rows(rows: PETSc.Mat, bounds: Sequence[int]) -> list[PETSc.Mat]:

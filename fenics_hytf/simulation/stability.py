@@ -36,7 +36,7 @@ def factor_of_safety(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> float:
         points = seed_points(scene, domain)
         filling = FillingSurvey(scene, domain).at_first(points) if scene.mesh.empty else None
         if filling is not None:
-            statics.occupy(filling, others=True)
+            statics.occupy(filling)
         statics.settle(points, survey(scene, domain, points, filling))
         slope.weigh(points, filling)
         return slope.factor_of_safety()

@@ -80,5 +80,5 @@ class Weighing:
         if others:
             self._observation.look_at(filling.filled)
         if self._statics is not None:
-            self._statics.occupy(filling, others)
+            self._statics.occupy(filling)
         return filling

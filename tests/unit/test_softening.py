@@ -207,7 +207,7 @@ def test_points_that_have_moved_are_softened_where_they_are(count, figure):
 
     def weighed():
         filling = look(points)
-        statics.occupy(filling, True)
+        statics.occupy(filling)
         return survey(case, domain, points, filling)
 
     def off() -> np.ndarray:

@@ -45,7 +45,7 @@ def settled(case, comm=WORLD, moved=None):
         move(domain.mesh, points, moved(points))
     if case.mesh.empty:
         filling = FillingSurvey(case, domain)(points)
-        statics.occupy(filling, True)
+        statics.occupy(filling)
     ground = survey(case, domain, points, filling)
     statics.settle(points, ground)
     return SimpleNamespace(

@@ -56,11 +56,11 @@ class Ground:
         load = self.gravity if gravity else None
         force = self.driving if driving is None else driving
         strength = self.strength(strength) if np.isscalar(strength) else strength
-        return self.search.find(self.unknowns.T, self.weight, strength, load, force, start)
+        return self.search.find(self.unknowns, self.weight, strength, load, force, start)
 
     def safety(self, strength) -> float:
         strength = self.strength(strength) if np.isscalar(strength) else strength
-        arguments = self.unknowns.T, self.weight, strength, self.gravity
+        arguments = self.unknowns, self.weight, strength, self.gravity
         return self.search.factor_of_safety(*arguments)
 
 
