@@ -42,6 +42,7 @@ SAFETY = 0.8
 """Part of the longest stable step that is taken where none is asked for."""
 
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+_SWINGING = 5.0  # after gravity was switched on at once [s]
 _AT_REST = 1e-9  # residual over gravity [-]
 _PATIENCE = 1000  # iterations, in which the residual has to fall to this part of what it was:
 _PROGRESS = 0.9
@@ -60,8 +61,6 @@ class Motion:
         displacement: Of the watched nodes less that at rest [m], shape
             ``(num_watched, 2, num_samples)``.
         largest: Largest length of it over all nodes [m], shape ``(num_samples,)``.
-        final: Of all nodes, at the end [m], shape ``(num_nodes, 2)``.
-        at_rest: Displacement under gravity alone [m], same shape.
         energy: Since rest, a metre thick [J], shape ``(num_samples,)`` each: ``work`` of gravity
             and of the base, and what became of it: ``kinetic``, ``elastic``, ``plastic``,
             ``viscous``.
@@ -72,8 +71,6 @@ class Motion:
     time: RealArray
     displacement: RealArray
     largest: RealArray
-    final: RealArray
-    at_rest: RealArray
     energy: dict[str, RealArray]
     state: State
     substeps: int
@@ -196,7 +193,7 @@ class Section:
         state.displacement[:] += increment
         strain(self.cells, state, np.ascontiguousarray(increment), 0.0, False)
 
-    def rest(self, start: str = "static", settle: float = 5.0) -> State:
+    def rest(self, start: str = "static") -> State:
         """The state under gravity.
 
         Stresses that gravity leaves in a yielding soil hang on how it is switched on. ``static``:
@@ -206,7 +203,6 @@ class Section:
 
         Args:
             start: ``static`` or ``sudden``.
-            settle: How long the soil swings after a sudden start [s].
 
         Returns:
             The state, without velocity.
@@ -219,7 +215,7 @@ class Section:
             raise ValueError(f"start: found {start!r}; expected static or sudden")
         state = self.unstressed()
         if start == "sudden":
-            self.march(state, np.zeros((2, 2)), settle)
+            self.march(state, np.zeros((2, 2)), _SWINGING)
             state.velocity[:], state.viscous[:] = 0.0, 0.0
         self._balance(state)
         return state
@@ -327,15 +323,12 @@ def elastoplastic_slope(
     drive = np.zeros((steps + 1, 2))
     drive[: len(base)] -= base[: steps + 1]
     state = start.copy() if isinstance(start, State) else section.rest(start)
-    at_rest = state.displacement.copy()
     displacement, largest, energy, substeps = section.march(state, drive, dt, substeps, watched)
     names = ("work", "kinetic", "elastic", "plastic", "viscous")
     return Motion(
         time=dt * np.arange(steps + 1, dtype=np.float64),
         displacement=displacement,
         largest=largest,
-        final=state.displacement - at_rest,
-        at_rest=at_rest,
         energy=dict(zip(names, energy, strict=True)),
         state=state,
         substeps=substeps,

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Rigid, decoupled and coupled slips of recorded motions, beside those of pyslammer.
 
-``python3 -m fenics_hytf.study.sliding_blocks`` draws them and writes them as a table. Ground is a
-column of 30 m with V_s = 200 m/s and 5 % of damping at its period, on a rigid base, that slips
-where it stands. The program pyslammer (an optional extra, called as it is) takes its first mode
-alone, after Rathje and Bray (1999, Can. Geotech. J. 36) where slip is coupled; here it is cells of
-lumped mass, of all modes, whose slip is marched under Q_lin with their kernel P. The same cells
-with an elastoplastic seam, marched in time, know nothing of either.
+Ground is a column of 30 m with V_s = 200 m/s and 5 % of damping at its period, on a rigid base,
+that slips where it stands. The program pyslammer (an optional extra, called as it is) takes its
+first mode alone, after Rathje and Bray (1999, Can. Geotech. J. 36) where slip is coupled; here it
+is cells of lumped mass, of all modes, whose slip is marched under Q_lin with their kernel P. The
+same cells with an elastoplastic seam, marched in time, know nothing of either.
 
 k_max is the peak of what drives a block: of the record for the rigid one, of the average
 acceleration of the column for the others. Records are straight lines between their samples, and all
@@ -15,9 +14,7 @@ march on them in equal steps.
 
 from __future__ import annotations
 
-import argparse
 import csv
-import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -33,7 +30,6 @@ from fenics_hytf.motion import (
     Record,
     decoupled_slip,
     march,
-    recorded,
     refined,
     rigid_slip,
 )
@@ -54,13 +50,10 @@ RATIOS = tuple(round(0.1 * tenth, 1) for tenth in range(1, 9))
 
 GROUND = Column(200.0)
 STEP = 0.0025  # s
-TABLE, FIGURE = "sliding_blocks.csv", "sliding_blocks.png"
 
 _PERIODS = 4  # of the motion, over which its linear response is computed
 _DECAY = 1e-8  # of what comes round after them
 _RIGID_BASE = 1e6  # m/s, of pyslammer's base
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -96,16 +89,13 @@ class Slips:
     elastoplastic: float
 
 
-def slips(
-    record: Record, ratios: Sequence[float] = RATIOS, step: float = STEP, column: Column = GROUND
-) -> Iterator[Slips]:
+def slips(record: Record, ratios: Sequence[float] = RATIOS, step: float = STEP) -> Iterator[Slips]:
     """Slips of a record.
 
     Args:
         record: The motion; its acceleration drives the slip.
         ratios: k_y over k_max.
         step: Longest time step [s].
-        column: The ground.
 
     Yields:
         Slips, a ratio each.
@@ -114,16 +104,16 @@ def slips(
 
     substeps = int(np.ceil(record.dt / step - 1e-9))
     dt, drive = record.dt / substeps, refined(record.acceleration, substeps)
-    mass = float(column.mass.sum())
-    driving = _linear_force(column, drive, dt)
+    mass = float(GROUND.mass.sum())
+    driving = _linear_force(GROUND, drive, dt)
     quadrature = ConvolutionQuadrature(drive.size, dt)
-    weights = quadrature.weights(_force_over_drive(column, quadrature.s))
+    weights = quadrature.weights(_force_over_drive(GROUND, quadrature.s))
     motion = pyslammer.GroundMotion(drive / GRAVITY, dt, record.name)
     ground = {
-        "height": column.height,
-        "vs_slope": column.shear_wave_velocity,
+        "height": GROUND.height,
+        "vs_slope": GROUND.shear_wave_velocity,
         "vs_base": _RIGID_BASE,
-        "damp_ratio": column.damping,
+        "damp_ratio": GROUND.damping,
     }
     average = np.array(pyslammer.Decoupled(1.0, motion, **ground).HEA)
     for ratio in ratios:
@@ -141,7 +131,7 @@ def slips(
             decoupled_same_drive=rigid_slip(average, same, dt).slip[-1],
             coupled=march(driving, mass * same, weights, dt).slip[-1],
             coupled_pyslammer=pyslammer.Coupled(k_y, motion, **ground).max_sliding_disp,
-            elastoplastic=elastoplastic_column(column, drive, dt, same, substeps=2)[-1],
+            elastoplastic=elastoplastic_column(GROUND, drive, dt, same, substeps=2)[-1],
         )
 
 
@@ -216,33 +206,3 @@ def _panel(axes: Axes, name: str, rows: Sequence[Slips]) -> None:
     axes.set_title(name.replace("_", " "))
     axes.set_xlabel("$k_y / k_{max}$")
     axes.set_ylabel("Slip [m]")
-
-
-def main() -> None:
-    """Draw, write and log the slips of all records."""
-    parser = argparse.ArgumentParser(description="Sliding blocks beside those of pyslammer.")
-    parser.add_argument("-o", "--output", type=Path, default=Path("."), help="folder")
-    parser.add_argument("--step", type=float, default=STEP, help=f"[s]; default {STEP}")
-    arguments = parser.parse_args()
-    rows: list[Slips] = []
-    pairs = (
-        ("rigid", "rigid_pyslammer"),
-        ("decoupled_same_drive", "decoupled_pyslammer"),
-        ("decoupled", "decoupled_pyslammer"),
-        ("coupled", "coupled_pyslammer"),
-        ("coupled", "elastoplastic"),
-        ("coupled_pyslammer", "elastoplastic"),
-    )
-    for name in RECORDS:
-        rows += slips(recorded(name), step=arguments.step)
-        log.info("%s", name)
-        for pair in pairs:
-            mine = [row for row in rows if row.record == name]
-            log.info("  %s over %s: %.4f to %.4f", *pair, *agreement(mine, *pair))
-    write(arguments.output / TABLE, rows)
-    draw(arguments.output / FIGURE, rows)
-
-
-if __name__ == "__main__":
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
-    main()

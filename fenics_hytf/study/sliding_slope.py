@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: MIT
 """A slope on a weak seam, that sliding is compared with.
 
-``python3 -m fenics_hytf.study.sliding_slope`` says how far it slips. It is ten metres high at 1:1.5
-on five metres of foundation, V_s = 200 m/s, K = 10 G, c = 150 kPa but in a seam 2.6 m high that
-leaves it at its toe:
+It is ten metres high at 1:1.5 on five metres of foundation, V_s = 200 m/s, K = 10 G, c = 150 kPa
+but in a seam 2.6 m high that leaves it at its toe:
 
     ground surface y = 5 + clip((35 − x)/1.5, 0, 10),   seam |y − 6 − 0.3 (35 − x)| < 1.3, y > 5
 
@@ -17,14 +16,11 @@ Its slips belong to cells of 1 m and to this seam, and compare methods on the sa
 
 from __future__ import annotations
 
-import argparse
-import logging
-
 import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import recorded
-from fenics_hytf.study.elastoplastic import Section, elastoplastic_slope
+from fenics_hytf.study.elastoplastic import Section
 
 RealArray = npt.NDArray[np.float64]
 
@@ -37,27 +33,19 @@ MOTIONS = ("sine", "Northridge")
 WIDTH, HEIGHT = 60, 15  # of the box of cells [m]
 TOE, CREST = 35.0, 20.0  # x [m]
 SHEAR_MODULUS = 1800.0 * 200.0**2  # [Pa]
+BETA = 5e-4  # [s]
 _LEAST_FILLED = 0.2
 _STRIPS = 200  # of a cell, whose filled heights are summed
 
-log = logging.getLogger(__name__)
-
 
 def reference_slope(
-    seam_cohesion: float = 17e3,
-    cell_size: float = 1.0,
-    *,
-    beta: float = 5e-4,
-    b_bar: bool = True,
-    damp_slip: bool = False,
+    seam_cohesion: float = 17e3, cell_size: float = 1.0, *, damp_slip: bool = False
 ) -> Section:
     """The slope.
 
     Args:
         seam_cohesion: c of the seam [Pa].
         cell_size: Side of a cell, which divides a metre [m].
-        beta: β [s].
-        b_bar: See :class:`Section`.
         damp_slip: See :class:`Section`.
 
     Returns:
@@ -91,9 +79,8 @@ def reference_slope(
         cohesion=np.where(seam, seam_cohesion, 150e3),
         fixed=fixed,
         weight=filled,
-        beta=beta,
+        beta=BETA,
         gravity=(0.0, -GRAVITY),
-        b_bar=b_bar,
         damp_slip=damp_slip,
     )
 
@@ -126,29 +113,3 @@ def _filled(lowest: RealArray, size: float) -> RealArray:
     x = lowest[:, 0, None] + (np.arange(_STRIPS) + 0.5) / _STRIPS * size
     surface = 5.0 + np.clip((TOE - x) / 1.5, 0.0, 10.0)
     return np.array(np.clip((surface - lowest[:, 1, None]) / size, 0.0, 1.0).mean(axis=1))
-
-
-def main() -> None:
-    """Log the slips of the slope."""
-    parser = argparse.ArgumentParser(description="Slip of the reference slope.")
-    parser.add_argument("--cell-size", type=float, default=1.0, help="[m]; default 1")
-    parser.add_argument("--seam-cohesion", type=float, default=17e3, help="[Pa]; default 17e3")
-    arguments = parser.parse_args()
-    section = reference_slope(arguments.seam_cohesion, arguments.cell_size)
-    for start in ("sudden", "static"):
-        rest = section.rest(start)
-        for name in MOTIONS:
-            motion = elastoplastic_slope(section, *reference_motion(name), start=rest)
-            log.info(
-                "%-10s %s gravity: slip %.4f m, %d steps a sample, energy closes to %.1g",
-                name,
-                start,
-                motion.slip,
-                motion.substeps,
-                motion.imbalance,
-            )
-
-
-if __name__ == "__main__":
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
-    main()
