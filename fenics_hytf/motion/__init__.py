@@ -22,8 +22,8 @@ from fenics_hytf.motion.sliding_block import (
     SlipHistory,
     decoupled_slip,
     march,
-    refined,
     rigid_slip,
+    straight_lines,
 )
 from fenics_hytf.motion.sources import harmonic, recorded, recorded_names, synthetic
 from fenics_hytf.motion.spectra import (
@@ -68,12 +68,12 @@ __all__ = [
     "read_csv",
     "recorded",
     "recorded_names",
-    "refined",
     "response_spectrum",
     "rigid_slip",
     "significant_duration",
     "smoothed",
     "split",
+    "straight_lines",
     "synthetic",
     "to_frequency",
     "to_time",

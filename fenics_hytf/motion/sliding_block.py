@@ -147,7 +147,7 @@ def decoupled_slip(
     return rigid_slip(_row("driving", driving) / mass, yield_force / mass, dt)
 
 
-def refined(samples: npt.ArrayLike, substeps: int) -> RealArray:
+def straight_lines(samples: npt.ArrayLike, substeps: int) -> RealArray:
     """Samples with others between them, on straight lines.
 
     Args:

@@ -12,6 +12,7 @@ from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
 from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh, components_of
 from fenics_hytf.scene.motion import MotionInput, direction_fault
+from fenics_hytf.scene.output import Output, Receiver
 from fenics_hytf.scene.quadrature import (
     allowed_points_per_cell,
     default_points_per_cell,
@@ -25,10 +26,8 @@ from fenics_hytf.scene.settings import (
     Effects,
     EquivalentLinear,
     Lapses,
-    Output,
     Points,
     Rayleigh,
-    Receiver,
     Solver,
 )
 from fenics_hytf.scene.soil import Soil

@@ -80,7 +80,6 @@ def read_boundary(
     raw: object,
     names: tuple[str, ...] | None,
     directions: Collection[str] = (),
-    key: str = "boundary",
 ) -> tuple[Boundary | None, list[Fault]]:
     """Read ``[boundary]``.
 
@@ -88,18 +87,17 @@ def read_boundary(
         raw: What stands in the file: kinds by the name of the boundary.
         names: Boundaries that there are, or ``None`` where only the mesh file knows.
         directions: Directions of the motions, as far as they can be read.
-        key: Where it stands.
 
     Returns:
         The boundaries that the scene names; and the faults.
     """
     if not isinstance(raw, dict):
-        return None, [Fault(key, toml_text(raw), "a table of boundaries")]
+        return None, [Fault("boundary", toml_text(raw), "a table of boundaries")]
     faults: list[Fault] = []
     kinds: dict[str, str] = {}
     rock = None
     for name, kind in raw.items():
-        where = join_key(key, name_key(name))
+        where = join_key("boundary", name_key(name))
         if names is not None and name not in names:
             faults.append(Fault(where, toml_text(kind), f"one of the names {', '.join(names)}"))
         if isinstance(kind, dict) and list(kind) == ["compliant"]:
@@ -114,7 +112,7 @@ def read_boundary(
     if faults:
         return None, faults
     if names is not None:
-        faults += _base_faults(kinds, names, directions, key)
+        faults += _base_faults(kinds, names, directions)
     return (None if faults else Boundary(MappingProxyType(kinds), rock)), faults
 
 
@@ -124,7 +122,7 @@ def default_kind(name: str) -> str:
 
 
 def _base_faults(
-    kinds: dict[str, str], names: tuple[str, ...], directions: Collection[str], key: str
+    kinds: dict[str, str], names: tuple[str, ...], directions: Collection[str]
 ) -> Iterator[Fault]:
     """Something moves with the base in the direction of every motion."""
     all_kinds = {name: kinds.get(name, default_kind(name)) for name in names}
@@ -142,18 +140,15 @@ def _base_faults(
         where = f" in {' and '.join(loose)}" if loose else ""
         text = ", ".join(f"{name} {kind}" for name, kind in all_kinds.items())
         expected = f"a boundary that moves with the base{where}: rigid, fixed or a roller across it"
-        yield Fault(key, text, expected)
+        yield Fault("boundary", text, expected)
 
 
-def outcrop_rules(
-    boundary: Boundary, directions: Collection[str], key: str = "boundary"
-) -> Iterator[Fault]:
+def outcrop_rules(boundary: Boundary, directions: Collection[str]) -> Iterator[Fault]:
     """Nothing but the rock holds ground on a compliant base under outcrop motions.
 
     Args:
         boundary: The boundaries.
         directions: Directions of the motions.
-        key: Where they stand.
 
     Yields:
         The faults: what is held would move as the bare rock does, which nothing at hand does.
@@ -162,7 +157,7 @@ def outcrop_rules(
         across = kind == "roller" and NORMALS.get(name) in directions
         if kind in ("rigid", "fixed") or across:
             expected = "tied, free_field, dashpot or free under an outcrop motion"
-            yield Fault(join_key(key, name_key(name)), f'"{kind}"', expected)
+            yield Fault(join_key("boundary", name_key(name)), f'"{kind}"', expected)
 
 
 def _read_rock(name: str, raw: object, key: str) -> tuple[Rock | None, list[Fault]]:

@@ -25,8 +25,8 @@ from fenics_hytf.scene.boundary import (
 from fenics_hytf.scene.continuity import (
     continuity_rules,
     resolve,
-    sliding_rules,
-    softening_rules,
+    rules_with_sliding,
+    rules_with_softening,
 )
 from fenics_hytf.scene.effects import effect_rules
 from fenics_hytf.scene.faults import (
@@ -39,14 +39,8 @@ from fenics_hytf.scene.faults import (
 )
 from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
 from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
-from fenics_hytf.scene.settings import (
-    Effects,
-    Lapses,
-    Output,
-    Points,
-    Solver,
-    read_output,
-)
+from fenics_hytf.scene.output import Output, read_output
+from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver
 from fenics_hytf.scene.soil import Soil, read_curves, read_soils
 from fenics_hytf.scene.table import as_list, number, read_table, unknown_key
 
@@ -140,7 +134,7 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
         faults.append(Fault("title", toml_text(title), "a string"))
     sections.mesh, found = read_mesh(raw.get("mesh"), folder)
     faults += found
-    sections.soil, found = read_soils(raw.get("soil"), folder=folder)
+    sections.soil, found = read_soils(raw.get("soil"), folder)
     faults += found
     gdim, drawn = raw_gdim(raw.get("mesh")), layout(raw.get("mesh"))
     sections.motion, found = read_motions(
@@ -267,10 +261,10 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
     yield from continuity_rules(raw, lapses, solver, motions, segments)
     if effects.sliding is not None:
         duration = max(segment.num_samples for segment in segments) * dt
-        yield from sliding_rules(effects.sliding, lapses, solver, duration)
+        yield from rules_with_sliding(effects.sliding, lapses, solver, duration)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
     if handed_over and effects.softening and effects.convection:
-        yield from softening_rules(solver)
+        yield from rules_with_softening(solver)
     if handed_over and solver.complex_modulus != "maxwell" and sections.boundary is not None:
         for name, kind in sections.boundary.kinds.items():
             if kind == "free_field":

@@ -66,7 +66,7 @@ def resolve(
     )
 
 
-def sliding_rules(
+def rules_with_sliding(
     sliding: Sliding, lapses: Lapses, solver: Solver, duration: float
 ) -> Iterator[Fault]:
     """What a mechanism that slides needs of lapses and law.
@@ -91,7 +91,7 @@ def sliding_rules(
         yield Fault("effects.sliding.time_step", f"{sliding.time_step:g}", expected)
 
 
-def softening_rules(solver: Solver) -> Iterator[Fault]:
+def rules_with_softening(solver: Solver) -> Iterator[Fault]:
     """What softening needs of the law, where points move from one transient lapse to the next.
 
     Args:

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
+from fenics_hytf.scene.output import Receiver
 from fenics_hytf.scene.scene import Scene
-from fenics_hytf.scene.settings import Receiver
 from fenics_hytf.scene.soil import Soil
 
 _BESIDE = {".xdmf": ".h5", ".node": ".ele", ".ele": ".node"}

@@ -254,13 +254,12 @@ class Mesh(Table):
         return index
 
 
-def read_mesh(raw: object, folder: Path, key: str = "mesh") -> tuple[Mesh | None, list[Fault]]:
+def read_mesh(raw: object, folder: Path) -> tuple[Mesh | None, list[Fault]]:
     """Read the section.
 
     Args:
         raw: What stands in the file.
         folder: Where relative paths start.
-        key: Where it stands.
 
     Returns:
         The mesh, or ``None`` if it has a fault; and its faults.
@@ -270,13 +269,13 @@ def read_mesh(raw: object, folder: Path, key: str = "mesh") -> tuple[Mesh | None
         path = Path(folder, raw["file"]).absolute()
         if not is_file(path):
             found = f"{toml_text(raw['file'])}, which is not there"
-            missing.append(Fault(join_key(key, "file"), found, f"a mesh file; looked for {path}"))
+            missing.append(Fault("mesh.file", found, f"a mesh file; looked for {path}"))
         raw = {**raw, "file": path}
-    mesh, faults = read_table(Mesh, raw, key)
+    mesh, faults = read_table(Mesh, raw, "mesh")
     faults += missing
     drawn = layout(raw)
     if drawn is not None:
-        faults += _uncovered(drawn, key)
+        faults += _uncovered(drawn)
     return (None if faults else mesh), faults
 
 
@@ -356,7 +355,7 @@ def _points_faults(points: float, degree: int, cells: tuple[str, ...], key: str)
         yield Fault(join_key(key, "points_per_cell"), toml_text(points), expected)
 
 
-def _uncovered(mesh: Mesh, key: str) -> Iterator[Fault]:
+def _uncovered(mesh: Mesh) -> Iterator[Fault]:
     """Cells of a box of quadrilaterals or hexahedra that no region covers, some rows at a time."""
     box = mesh.box
     if box is None or not mesh.regions or box.cell not in ("quadrilateral", "hexahedron"):
@@ -380,4 +379,4 @@ def _uncovered(mesh: Mesh, key: str) -> Iterator[Fault]:
         more = " ..." if count > len(bare) else ""
         where = f"centred at {'height ' if flat else ''}{places} m{more}"
         text = f"{count} {what} without soil, {where}"
-        yield Fault(join_key(key, "regions"), text, "a region for every cell")
+        yield Fault("mesh.regions", text, "a region for every cell")

@@ -96,7 +96,7 @@ class MotionTable(Table):
 
 
 def read_motions(
-    raw: object, folder: Path, components: tuple[str, ...] | None, key: str = "motion"
+    raw: object, folder: Path, components: tuple[str, ...] | None
 ) -> tuple[tuple[MotionInput | None, ...], list[Fault]]:
     """Read all motions.
 
@@ -104,26 +104,25 @@ def read_motions(
         raw: What stands in the file, an array of tables.
         folder: Where relative paths start.
         components: Displacement components, or ``None`` where only the mesh file knows them.
-        key: Where it stands.
 
     Returns:
         The motions in the file's order, ``None`` where one has a fault; and the faults.
     """
     if not isinstance(raw, list | tuple) or not raw:
-        return (), [Fault(key, toml_text(raw), "at least one table [[motion]]")]
+        return (), [Fault("motion", toml_text(raw), "at least one table [[motion]]")]
     faults: list[Fault] = []
     motions: list[MotionInput | None] = []
     dt0: float | None = None
     first: dict[str, int] = {}
     for i, table in enumerate(raw):
-        where = join_key(key, i)
+        where = join_key("motion", i)
         motion, found = _read_motion(table, folder, where)
         faults += found
         direction = table.get("direction") if isinstance(table, dict) else None
         if components is not None and direction in AXES and direction not in components:
             faults.append(direction_fault(join_key(where, "direction"), direction, components))
         if isinstance(direction, str) and direction in first:
-            expected = f"each direction once; {key}[{first[direction]}] has it"
+            expected = f"each direction once; motion[{first[direction]}] has it"
             faults.append(Fault(join_key(where, "direction"), toml_text(direction), expected))
         elif isinstance(direction, str):
             first[direction] = i
@@ -145,29 +144,28 @@ def direction_fault(key: str, direction: str, components: tuple[str, ...]) -> Fa
     return Fault(key, f'"{direction}"', f"{names}: the mesh is {kinds[len(components)]}")
 
 
-def input_rules(
-    motions: tuple[MotionInput | None, ...], base: str, key: str = "motion"
-) -> Iterator[Fault]:
+def input_rules(motions: tuple[MotionInput | None, ...], base: str) -> Iterator[Fault]:
     """Outcrop motions come up through a compliant base; all motions are of one kind.
 
     Args:
         motions: The motions that could be read.
         base: Kind of the base.
-        key: Where they stand.
 
     Yields:
         The faults.
     """
-    read = [(join_key(key, i, "input"), m.input) for i, m in enumerate(motions) if m is not None]
-    for where, kind in read:
+    kinds = {i: motion.input for i, motion in enumerate(motions) if motion is not None}
+    first = next(iter(kinds.values()), None)
+    for i, kind in kinds.items():
+        where = join_key("motion", i, "input")
         if kind == "outcrop" and base != "compliant":
             expected = (
                 '"within" on a rigid base; or boundary.base = { compliant = ... } with the '
                 "properties of the rock"
             )
             yield Fault(where, f'"outcrop" on a base that is {base}', expected)
-        elif kind != read[0][1]:
-            yield Fault(where, f'"{kind}"', f'"{read[0][1]}", as the first motion is')
+        elif kind != first:
+            yield Fault(where, f'"{kind}"', f'"{first}", as the first motion is')
 
 
 def _read_motion(raw: object, folder: Path, key: str) -> tuple[MotionInput | None, list[Fault]]:

@@ -20,7 +20,8 @@ from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.mesh import Mesh
 from fenics_hytf.scene.motion import MotionInput
-from fenics_hytf.scene.settings import Effects, Lapses, Output, Points, Solver
+from fenics_hytf.scene.output import Output
+from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver
 from fenics_hytf.scene.soil import Soil
 from fenics_hytf.scene.source import copy_data, read_source
 

@@ -119,25 +119,22 @@ class Soil(Table):
         return 0.0 if self.damping is None else self.damping
 
 
-def read_soils(
-    raw: object, key: str = "soil", folder: Path = Path()
-) -> tuple[dict[str, Soil | None], list[Fault]]:
+def read_soils(raw: object, folder: Path = Path()) -> tuple[dict[str, Soil | None], list[Fault]]:
     """Read all soils.
 
     Args:
         raw: What stands in the file, a table of tables.
-        key: Where it stands.
         folder: Where relative paths start.
 
     Returns:
         The soils by name, ``None`` where one has a fault; and the faults.
     """
     if not isinstance(raw, dict) or not raw:
-        return {}, [Fault(key, toml_text(raw), "at least one table [soil.NAME]")]
+        return {}, [Fault("soil", toml_text(raw), "at least one table [soil.NAME]")]
     soils: dict[str, Soil | None] = {}
     faults: list[Fault] = []
     for name, table in raw.items():
-        where = join_key(key, name_key(name))
+        where = join_key("soil", name_key(name))
         with_columns, found = _read_file_of(table, folder, where)
         soil, others = read_table(Soil, with_columns, where)
         found += others

@@ -41,7 +41,7 @@ from fenics_hytf.study.records import (
     core_s,
 )
 from fenics_hytf.study.runs import Job, Outcome, Runner
-from fenics_hytf.study.slides import SLIP, apart
+from fenics_hytf.study.slip_measures import SLIP, slip_errors
 from fenics_hytf.study.uncertainty import uncertainty
 from fenics_hytf.study.verdict import sentences
 
@@ -263,7 +263,7 @@ class _Course:
         for setting, found in self._good().items():
             assert found.response is not None  # it ran
             distance[setting] = self._measure.distance(found.response, base.response)
-            slips[setting] = apart(found.slid, base.slid).get(SLIP, 0.0)
+            slips[setting] = slip_errors(found.slid, base.slid).get(SLIP, 0.0)
         self._reference = self._doubted(self._reference, fine, distance)
         if self._slip_reference is not None:
             self._slip_reference = self._doubted(self._slip_reference, fine, slips)

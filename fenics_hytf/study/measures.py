@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import response_spectrum
-from fenics_hytf.study.slides import apart
+from fenics_hytf.study.slip_measures import slip_errors
 
 RealArray = npt.NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Error:
         relative_l2: Of the worst receiver [-].
         ln_psa: Largest |ln PSA ratio| [-].
         receiver: Name of the worst receiver in L2.
-        slides: Relative differences of what slid, by the keys of ``slides.MEASURES`` [-].
+        slides: Relative differences of what slid, by the keys of ``slip_measures.MEASURES`` [-].
     """
 
     relative_l2: float
@@ -57,7 +57,7 @@ class Yardstick:
             ``(num_receivers, num_components, num_samples)``.
         dt: Time step [s].
         names: Of the receivers.
-        slid: What slid in the reference, by the keys of ``slides.MEASURES``.
+        slid: What slid in the reference, by the keys of ``slip_measures.MEASURES``.
 
     Raises:
         ValueError: If the reference does not move, or is not a number somewhere.
@@ -119,7 +119,7 @@ class Yardstick:
         spectra = self._spectrum(self.fitted(response))
         with np.errstate(divide="ignore"):  # a response of nought is infinitely far in ln
             ratio = np.abs(np.log(spectra / self._spectra))
-        slides = apart(slid or {}, self.slid)
+        slides = slip_errors(slid or {}, self.slid)
         return Error(float(by_receiver[worst]), float(ratio.max()), self._names[worst], slides)
 
     def distance(self, one: RealArray, other: RealArray) -> float:

@@ -9,7 +9,7 @@ from typing import Self
 
 from fenics_hytf.study.measures import Error
 from fenics_hytf.study.runs import Cost
-from fenics_hytf.study.slides import SLIP
+from fenics_hytf.study.slip_measures import SLIP
 
 TARGETS = (0.05, 0.01, 0.001)
 """Errors that a cheapest setting is sought for, relative L2 [-]."""
@@ -44,7 +44,7 @@ class Point:
         values: Value of each knob.
         words: The same in words.
         substeps: Time steps per sample, of a march.
-        slid: What slid, by the keys of ``slides.MEASURES``.
+        slid: What slid, by the keys of ``slip_measures.MEASURES``.
     """
 
     name: str

@@ -45,7 +45,7 @@ _ROOMS = (  # that a run solves with, as :func:`_code` looks at them
     "lapse",
     "simulation",
 )
-_SHARED = ("_compat.py", "results/sliding.py", "study/slides.py", "study/worker.py")
+_SHARED = ("_compat.py", "results/sliding.py", "study/slip_measures.py", "study/worker.py")
 _MARCHING = ("study/newmark.py", "study/matrices.py")
 _ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
@@ -112,7 +112,7 @@ class Outcome:
             num_components, num_samples)``; ``None`` if it failed.
         failure: Why it failed.
         kept: Whether it was found, not run.
-        slid: What slid, by the keys of ``slides.MEASURES``; empty where nothing is to slide.
+        slid: What slid, by the keys of ``slip_measures.MEASURES``; empty where nothing is to slide.
     """
 
     cost: Cost | None

@@ -30,8 +30,8 @@ from fenics_hytf.motion import (
     Record,
     decoupled_slip,
     march,
-    refined,
     rigid_slip,
+    straight_lines,
 )
 from fenics_hytf.results.figures.style import COLOURS, INK, figure_style, save
 from fenics_hytf.study.sliding_column import Column, elastoplastic_column
@@ -103,7 +103,7 @@ def slips(record: Record, ratios: Sequence[float] = RATIOS, step: float = STEP) 
     import pyslammer  # a second, and an optional extra
 
     substeps = int(np.ceil(record.dt / step - 1e-9))
-    dt, drive = record.dt / substeps, refined(record.acceleration, substeps)
+    dt, drive = record.dt / substeps, straight_lines(record.acceleration, substeps)
     mass = float(GROUND.mass.sum())
     driving = _linear_force(GROUND, drive, dt)
     quadrature = ConvolutionQuadrature(drive.size, dt)

@@ -20,7 +20,7 @@ from fenics_hytf.results.folder import replace_file
 from fenics_hytf.results.summary import own_version
 from fenics_hytf.study.knobs import LABELS, MESH
 from fenics_hytf.study.records import Point, Study, core_s, pareto
-from fenics_hytf.study.slides import MEASURES
+from fenics_hytf.study.slip_measures import MEASURES
 from fenics_hytf.study.verdict import percent
 
 _MakeRow = Callable[[Point, str, str], tuple[str, ...]]

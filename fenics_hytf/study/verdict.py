@@ -17,7 +17,7 @@ from fenics_hytf.study.records import (
     error_of,
     measured,
 )
-from fenics_hytf.study.slides import SLIP
+from fenics_hytf.study.slip_measures import SLIP
 from fenics_hytf.study.time_domain import METHODS
 
 

@@ -26,7 +26,7 @@ from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import SimulationError, Snapshot, peak_memory, simulate
 from fenics_hytf.study.newmark import integrate
 from fenics_hytf.study.runs import COST, FAILURE, JOB, RESPONSE, Cost, Job, read_job, write_cost
-from fenics_hytf.study.slides import slid
+from fenics_hytf.study.slip_measures import slip_measures
 
 RealArray = npt.NDArray[np.float64]
 
@@ -172,7 +172,7 @@ def _simulated(scene: Scene) -> tuple[RealArray, Work]:
     slides, moves = scene.effects.sliding is not None, scene.effects.convection
     result = simulate(scene, snapshot=seen.append if slides and moves else None)
     work, sizes = result.work, result.sizes
-    moved = slid(result, seen[-1] if seen else None)
+    moved = slip_measures(result, seen[-1] if seen else None)
     done = Work(work.factorisations, work.solves, sizes["unknowns"], sizes["cells"], moved)
     return result.history("total_acceleration"), done
 

@@ -21,8 +21,8 @@ from fenics_hytf.motion import (
     decoupled_slip,
     march,
     recorded,
-    refined,
     rigid_slip,
+    straight_lines,
 )
 
 G = 9.81
@@ -279,7 +279,7 @@ def test_a_march_of_20000_steps(figure):
     start = perf_counter()
     history = march(driving, LIMIT, weights, STEP)
     figure("20 000 steps", perf_counter() - start, 5.0, "s")
-    exact = system.elastoplastic(refined(drive, 2), STEP / 2, LIMIT)
+    exact = system.elastoplastic(straight_lines(drive, 2), STEP / 2, LIMIT)
     assert exact > 10.0
     figure("20 000 steps: error of slip", abs(history.slip[-1] / exact - 1), 5e-3)
     assert np.ptp(history.slip[int(0.8 * num) :]) == 0.0  # at rest
@@ -364,7 +364,7 @@ def test_against_pyslammer_at_a_fine_step(pyslammer, figure):
     """The two tend to each other."""
     record = recorded(COARSEST)
     rigid, decoupled = largest_difference(
-        pyslammer, refined(record.acceleration, 16), record.dt / 16
+        pyslammer, straight_lines(record.acceleration, 16), record.dt / 16
     )
     figure(f"{COARSEST}, 1.25 ms: rigid block and pyslammer's", rigid, 0.002)
     figure(f"{COARSEST}, 1.25 ms: decoupled block and pyslammer's", decoupled, 5e-4)
@@ -403,7 +403,7 @@ def test_why_the_rigid_blocks_differ(pyslammer, figure):
     """
     record = recorded(COARSEST)
     for substeps, ours, theirs in ((1, 0.02, 0.06), (16, 1e-3, 1e-3)):
-        drive, dt = refined(record.acceleration, substeps), record.dt / substeps
+        drive, dt = straight_lines(record.acceleration, substeps), record.dt / substeps
         motion = pyslammer.GroundMotion(drive / GRAVITY, dt, "record")
         errors = []
         for ratio in RATIOS:
@@ -423,17 +423,17 @@ def test_why_the_rigid_blocks_differ(pyslammer, figure):
 
 
 def test_refined():
-    np.testing.assert_array_equal(refined([1.0, 3.0, -1.0], 2), [1, 2, 3, 1, -1])
+    np.testing.assert_array_equal(straight_lines([1.0, 3.0, -1.0], 2), [1, 2, 3, 1, -1])
     samples = np.random.default_rng(1).normal(size=(2, 3, 7))
-    fine = refined(samples, 5)
+    fine = straight_lines(samples, 5)
     assert fine.shape == (2, 3, 31)
     np.testing.assert_array_equal(fine[..., ::5], samples)
     np.testing.assert_allclose(np.diff(fine, 2)[..., :3], 0, atol=1e-14)
-    np.testing.assert_array_equal(refined(samples, 1), samples)
-    np.testing.assert_array_equal(refined([4.0], 3), [4.0])
+    np.testing.assert_array_equal(straight_lines(samples, 1), samples)
+    np.testing.assert_array_equal(straight_lines([4.0], 3), [4.0])
     for given, substeps in (([1.0], 0), ([1.0], 1.5), ([], 2), (1.0, 2)):
         with pytest.raises(ValueError, match=r"substeps|samples"):
-            refined(given, substeps)
+            straight_lines(given, substeps)
 
 
 # ---------------------------------------------------------------- what is refused

@@ -17,7 +17,7 @@ from fenics_hytf.study.knobs import Knobs
 from fenics_hytf.study.overrides import text_of
 from fenics_hytf.study.plan import Costs
 from fenics_hytf.study.runs import Cost, Job, Outcome
-from fenics_hytf.study.slides import MEASURES, apart, slid
+from fenics_hytf.study.slip_measures import MEASURES, slip_errors, slip_measures
 from fenics_hytf.study.tables import slip_table, write_tables
 from fenics_hytf.study.uncertainty import uncertainty
 
@@ -108,13 +108,13 @@ def test_what_a_step_leaves():
 
 
 def test_relative_differences():
-    assert apart(
+    assert slip_errors(
         {"slip_m": 0.9, "rigid_m": 0.0}, {"slip_m": 1.0, "rigid_m": 0.0, "run_out_m": 1}
     ) == {
         "slip_m": pytest.approx(0.1),
         "rigid_m": 0.0,
     }
-    assert apart({"slip_m": 0.1}, {"slip_m": 0.0}) == {"slip_m": np.inf}
+    assert slip_errors({"slip_m": 0.1}, {"slip_m": 0.0}) == {"slip_m": np.inf}
 
 
 def test_a_run_tells_what_slid(tmp_path):
@@ -149,7 +149,7 @@ def in_process(job, limit=None) -> Outcome:
     cells = sum(layer.cells for layer in job.scene.mesh.column.layers)
     seconds = 1e-3 * cells * job.scene.mesh.degree / job.scene.effects.sliding.time_step**0.5
     cost = Cost(seconds, seconds, result.work.factorisations, result.work.solves, 2**20, 1, cells)
-    return Outcome(cost, result.history("total_acceleration"), slid=slid(result, None))
+    return Outcome(cost, result.history("total_acceleration"), slid=slip_measures(result, None))
 
 
 def test_a_column_that_slides(monkeypatch, tmp_path, figure):

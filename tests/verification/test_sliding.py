@@ -16,7 +16,7 @@ from mpi4py import MPI
 from support.reference import load_sliding
 from support.sliding import DENSITY, GRAVITY, column, in_file, open_energy, sine, slope, total
 
-from fenics_hytf.motion import recorded, refined
+from fenics_hytf.motion import recorded, straight_lines
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import CheckpointFolder, Result, simulate
 
@@ -52,7 +52,7 @@ def column_drive(case: dict) -> np.ndarray:
         record = recorded(RECORDS[case["motion"]])
         given = record.acceleration[:: 2 if record.dt < 0.01 else 1][: case["samples"]]
         given = given / given[np.argmax(np.abs(given))]
-    return case["pga_g"] * GRAVITY * refined(given, round(case["dt_s"] / 5e-3))
+    return case["pga_g"] * GRAVITY * straight_lines(given, round(case["dt_s"] / 5e-3))
 
 
 @with_records
@@ -103,7 +103,7 @@ def marched(drive: np.ndarray, dt: float, k_y: float, alpha: float, rock: float)
     C[0, 0] += rock if rock else 1e15
     e, h, limit = ends[0], dt / 8, k_y * GRAVITY * M[1:].sum()
     inverse = np.linalg.inv(K + spring * np.outer(e, e) + 2 / h * C + np.diag(4 / h**2 * M))
-    fine = refined(drive, 8)
+    fine = straight_lines(drive, 8)
     u, v = np.zeros((2, len(M)))
     acceleration, slip = np.full(len(M), fine[0]), 0.0
     for a in fine[1:]:

@@ -14,8 +14,8 @@ from fenics_hytf.motion import (
     decoupled_slip,
     march,
     recorded,
-    refined,
     rigid_slip,
+    straight_lines,
 )
 
 STEP = 0.005  # [s]
@@ -48,7 +48,7 @@ def drive(motion: str, pga_g: float, samples: int, dt: float) -> np.ndarray:
         record = recorded(RECORDS[motion])
         given = record.acceleration[:: 2 if record.dt < 0.01 else 1][:samples]
         given = given / given[np.argmax(np.abs(given))]
-    return pga_g * g * refined(given, round(dt / STEP))
+    return pga_g * g * straight_lines(given, round(dt / STEP))
 
 
 @dataclass(frozen=True)

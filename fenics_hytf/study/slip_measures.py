@@ -24,7 +24,7 @@ MEASURES = {
 far the farthest point has come, where points move; the yield coefficient of the first lapse."""
 
 
-def slid(result: Result, last: Snapshot | None) -> dict[str, float]:
+def slip_measures(result: Result, last: Snapshot | None) -> dict[str, float]:
     """What slid in a run.
 
     Args:
@@ -44,12 +44,14 @@ def slid(result: Result, last: Snapshot | None) -> dict[str, float]:
     return found
 
 
-def apart(found: Mapping[str, float], reference: Mapping[str, float]) -> dict[str, float]:
+def slip_errors(found: Mapping[str, float], reference: Mapping[str, float]) -> dict[str, float]:
     """Relative difference of each number that two runs share [-]; infinite from nought."""
-    return {name: _apart(found[name], value) for name, value in reference.items() if name in found}
+    return {
+        name: _difference(found[name], value) for name, value in reference.items() if name in found
+    }
 
 
-def _apart(found: float, reference: float) -> float:
+def _difference(found: float, reference: float) -> float:
     if found == reference:
         return 0.0
     return abs(found / reference - 1) if reference else float("inf")
