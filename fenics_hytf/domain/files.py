@@ -75,14 +75,14 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
     facets = {k: f[(f >= 0).all(axis=1)] for k, f in facets.items()}
     region, names = _regions(raw, kind, gdim, soils, path)
     data = MeshData(
-        points,
-        inverse.reshape(cells.shape)[:, order],
-        name,
-        degree,
-        region,
-        names,
-        {} if facets else _box_around(points, path),
-        facets,
+        points=points,
+        cells=inverse.reshape(cells.shape)[:, order],
+        cell_type=name,
+        degree=degree,
+        region=region,
+        region_names=names,
+        planes={} if facets else _box_around(points, path),
+        facets=facets,
     )
     refuse_tangled_cells(data)
     _refuse_split_nodes(points, path)

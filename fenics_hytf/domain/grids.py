@@ -83,13 +83,13 @@ def column_mesh(column: Column) -> MeshData:
         [np.full(layer.cells, names.index(layer.soil), np.int32) for layer in column.layers]
     )
     return MeshData(
-        points,
-        cells[::-1].copy(),
-        "quadrilateral",
-        1,
-        region,
-        names,
-        box_sides(np.zeros(2), np.array([column.width, column.height])),
+        points=points,
+        cells=cells[::-1].copy(),
+        cell_type="quadrilateral",
+        degree=1,
+        region=region,
+        region_names=names,
+        planes=box_sides(np.zeros(2), np.array([column.width, column.height])),
     )
 
 
@@ -114,7 +114,15 @@ def stack_mesh(
     low, high = np.zeros(gdim), np.full(gdim, width)
     low[-1], high[-1] = levels[0], levels[-1]
     cell_type = "quadrilateral" if gdim == 2 else "hexahedron"
-    return MeshData(points, cells, cell_type, 1, region, names, box_sides(low, high))
+    return MeshData(
+        points=points,
+        cells=cells,
+        cell_type=cell_type,
+        degree=1,
+        region=region,
+        region_names=names,
+        planes=box_sides(low, high),
+    )
 
 
 def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
@@ -142,8 +150,15 @@ def box_mesh(box: Box, mesh: Mesh, soils: Sequence[str]) -> MeshData:
     elif box.cell == "tetrahedron":
         cells = cells[:, np.array(_TETRAHEDRA)].reshape(-1, 4)
     region, names = _regions(points[cells].mean(axis=1), mesh, soils)
-    sides = box_sides(np.zeros(len(box.size)), np.array(box.size))
-    return MeshData(points, cells, box.cell, 1, region, names, sides)
+    return MeshData(
+        points=points,
+        cells=cells,
+        cell_type=box.cell,
+        degree=1,
+        region=region,
+        region_names=names,
+        planes=box_sides(np.zeros(len(box.size)), np.array(box.size)),
+    )
 
 
 def box_sides(

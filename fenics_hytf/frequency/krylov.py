@@ -23,6 +23,7 @@ from fenics_hytf.frequency.system import ScalarFunction
 
 ComplexArray = npt.NDArray[np.complex128]
 
+_ORDER = 2  # Taylor coefficients of A that are used
 _CIRCLE = 0.3  # radius of the circle round an expansion point, over its distance from the real axis
 _NODES = 16  # on the circle: a function that is regular within three times it is exact to 1e-8
 _NOTHING = 1e-12  # of a vector: what the directions before leave of it is round-off
@@ -51,7 +52,6 @@ def krylov_block(
     first: ComplexArray,
     s: complex,
     size: int,
-    order: int = 2,
 ) -> ComplexArray:
     """Orthonormal basis of the first Taylor coefficients of x about s.
 
@@ -62,14 +62,13 @@ def krylov_block(
         s: Expansion point [rad/s]; on the real axis, where a hysteretic law is not regular, the
             block is the solution alone.
         size: Directions wanted.
-        order: Taylor coefficients of A that are used.
 
     Returns:
         Shape ``(num_local, size)``, or narrower where there are fewer.
     """
     radius = _CIRCLE * abs(s.imag)
     steps = size if radius > 0 else 1
-    coefficients = [taylor(f, s, order, radius) for f in products.functions] if radius else []
+    coefficients = [taylor(f, s, _ORDER, radius) for f in products.functions] if radius else []
     comm = products.comm
     length = norm(comm, first)
     Q = np.empty((len(first), steps), np.complex128)
@@ -77,11 +76,11 @@ def krylov_block(
         return Q[:, :0]
     Q[:, 0] = first / length
     # States of the recurrence (x_{k−1}, ..., x_{k−order}) in terms of Q, orthonormal as a whole.
-    states = np.zeros((steps, order, steps), np.complex128)
+    states = np.zeros((steps, _ORDER, steps), np.complex128)
     states[0, 0, 0] = 1.0
     for k in range(1, steps):
         pull = np.zeros(len(first), np.complex128)
-        for back in range(order):
+        for back in range(_ORDER):
             x = Q[:, :k] @ states[k - 1, back, :k]
             pull -= products.weighted([c[back + 1] for c in coefficients], x)
         w = solve(pull)
@@ -90,9 +89,9 @@ def krylov_block(
         if length <= _NOTHING * norm(comm, w):
             return Q[:, :k]
         Q[:, k] = rest / length
-        state = np.zeros((order, steps), np.complex128)
+        state = np.zeros((_ORDER, steps), np.complex128)
         state[0, :k], state[0, k] = overlap, length
-        state[1:] = states[k - 1, : order - 1]
+        state[1:] = states[k - 1, : _ORDER - 1]
         states[k] = _beside_states(states[:k], state)
     return Q
 

@@ -347,14 +347,14 @@ class _Growth:
             y = np.empty((self._basis.size, self._loads.norms.shape[1], 0), np.complex128)
         self._basis.V.scale(self._products.scale)
         return ReducedSweep(
-            self._lines,
-            self.residuals,
-            self._across.allreduce(self._factorisation.factorisations),
-            self._across.allreduce(self._solves),
-            self._basis.V,
-            y,
-            tuple(self.expansions),
-            np.complex64 if self._tolerance > _SINGLE else np.complex128,
+            s=self._lines,
+            residuals=self.residuals,
+            factorisations=self._across.allreduce(self._factorisation.factorisations),
+            solves=self._across.allreduce(self._solves),
+            basis=self._basis.V,
+            coordinates=y,
+            expansions=tuple(self.expansions),
+            precision=np.complex64 if self._tolerance > _SINGLE else np.complex128,
         )
 
 

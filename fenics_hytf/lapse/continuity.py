@@ -19,17 +19,21 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import Loads, Sweep
 from fenics_hytf.lapse.cells import CarriedCells
 from fenics_hytf.lapse.energy import Energy
-from fenics_hytf.lapse.equations import LapseEquations
+from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.slipped import Slipped
+from fenics_hytf.lapse.starts import largest
 from fenics_hytf.motion import Segment, excited_lines, to_frequency
-from fenics_hytf.particles import Points
+from fenics_hytf.particles import Points, transfer_matrix
 from fenics_hytf.scene import Scene
+
+RealArray = npt.NDArray[np.float64]
 
 # Solves the equations at hand for right-hand sides.
 Solve = Callable[[Sequence[PETSc.Vec] | Loads], Sweep]
@@ -104,6 +108,32 @@ class Continuity(Protocol):
         """Destroy all PETSc objects."""
 
 
+def jump_at_start(
+    domain: Domain,
+    equations: Equations,
+    points: Points,
+    response: Response,
+    displacement: RealArray | float,
+) -> tuple[float, float]:
+    """How far a response is off what points carry as the lapse starts (collective).
+
+    Args:
+        domain: The domain.
+        equations: Its equations.
+        points: The points, with the velocity that they carry.
+        response: The response.
+        displacement: What it goes on from at each point [m], shape
+            ``(len(points), num_components)``.
+
+    Returns:
+        Largest difference of displacement [m] and of velocity [m/s] over all points.
+    """
+    S = transfer_matrix(points, domain.V)
+    u, v = (S @ equations.unknowns.expand(response.unknowns_at(0.0, order)) for order in (0, 1))
+    jumps = u - displacement, v - points["dynamic_velocity"]
+    return largest(domain.comm, jumps[0]), largest(domain.comm, jumps[1])
+
+
 class Steady:
     """Each lapse its own periodic steady state.
 
@@ -156,9 +186,7 @@ class Steady:
         """There are none."""
 
 
-def excite(
-    scene: Scene, acceleration: npt.NDArray[np.float64], axes: tuple[int, ...]
-) -> Excitation:
+def excite(scene: Scene, acceleration: RealArray, axes: tuple[int, ...]) -> Excitation:
     """Find the lines of a periodic lapse that carry energy.
 
     Args:

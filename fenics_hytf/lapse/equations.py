@@ -343,12 +343,12 @@ class Equations:
         damping = self._damping(parts, ground, material.real)
         system = DynamicSystem(terms, self._constrained["mass"], damping)
         return LapseEquations(
-            system,
-            self.sides.loads(self.inertia.forces, self.T),
-            [matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
-            self._drag(),
-            stiff,
-            lasting,
+            system=system,
+            loads=self.sides.loads(self.inertia.forces, self.T),
+            viscous=[matrix for matrix, _ in self._radiating] + ([damping] if damping else []),
+            drag=self._drag(),
+            stiff=stiff,
+            lasting=lasting,
         )
 
     def _drag(self) -> list[tuple[PETSc.Mat, float]]:

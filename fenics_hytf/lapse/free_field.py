@@ -173,8 +173,8 @@ class FreeField:
             self._excitation,
             self._continuity,
             self._probe,
-            start,
-            observer,
+            start=start,
+            observer=observer,
         )
         self._strain = solved.effective_strain
         self._solved = solved

@@ -29,7 +29,7 @@ from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import AffineLoads, Columns
 from fenics_hytf.lapse.carried import FADING, State, fading, half_of_normal, stress_of
 from fenics_hytf.lapse.cells import CarriedCells
-from fenics_hytf.lapse.continuity import Solve
+from fenics_hytf.lapse.continuity import Solve, jump_at_start
 from fenics_hytf.lapse.energy import Energy
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
@@ -38,7 +38,7 @@ from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.lapse.starts import largest, product, start_accelerations, start_columns
+from fenics_hytf.lapse.starts import product, start_accelerations, start_columns
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.motion import (
     LapseRecord,
@@ -112,11 +112,11 @@ class Handover:
         return Excitation.on_contour(
             self._contour,
             self._scene.solver.max_frequency,
-            self._record.weights(self._contour, segment.start, segment.num_samples),
-            self._equations.axes,
-            segment,
-            self._record.samples,
-            self._start,
+            weights=self._record.weights(self._contour, segment.start, segment.num_samples),
+            axes=self._equations.axes,
+            segment=segment,
+            motion=self._record.samples,
+            start=self._start,
         )
 
     def slip_on(self, mechanism: RealArray, rate: float) -> None:
@@ -308,14 +308,7 @@ class Handover:
         """Increment and velocity at the start of the lapse, against nought and what was carried."""
         if self._segment.index == 0:
             return None
-        S = transfer_matrix(points, self._domain.V)
-        u, v = (
-            S @ self._equations.unknowns.expand(response.unknowns_at(0.0, order))
-            for order in (0, 1)
-        )
-        return largest(self._domain.comm, u), largest(
-            self._domain.comm, v - points["dynamic_velocity"]
-        )
+        return jump_at_start(self._domain, self._equations, points, response, 0.0)
 
     def energy(
         self,
@@ -335,12 +328,12 @@ class Handover:
                 LapseForces(self._force, forces, rest, self._imbalance, self.motion_to_end),
                 self._domain,
                 self._equations,
-                self._solved,
-                self._at_gauss,
-                response,
-                material,
-                stored_before,
-                slip,
+                solved=self._solved,
+                state=self._at_gauss,
+                response=response,
+                material=material,
+                stored_before=stored_before,
+                slip=slip,
             )
         finally:
             for force in (*forces, rest):

@@ -107,13 +107,13 @@ def handover_energy(
     strain[1] += sum(0.5 * float(course.quadratic(K, increment)[0]) for K, _ in others)
     stored = float(kinetic[0]) + strain[0]
     return Energy(
-        course.integral(power),
-        course.integral(lost) + float(faded),
-        course.integral(released),
-        (float(kinetic[0]), float(kinetic[-1])),
-        (strain[0], strain[1]),
-        0.0 if stored_before is None else stored - stored_before,
-        0.0 if slip is None else slip.yield_force * slip.total,
+        input=course.integral(power),
+        damping=course.integral(lost) + float(faded),
+        rest=course.integral(released),
+        kinetic=(float(kinetic[0]), float(kinetic[-1])),
+        strain=(strain[0], strain[1]),
+        seam=0.0 if stored_before is None else stored - stored_before,
+        slip=0.0 if slip is None else slip.yield_force * slip.total,
     )
 
 

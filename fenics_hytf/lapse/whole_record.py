@@ -22,14 +22,14 @@ from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import AffineLoads, Columns, JoinedSweep
-from fenics_hytf.lapse.continuity import Solve
+from fenics_hytf.lapse.continuity import Solve, jump_at_start
 from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.excitation import Excitation
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.response import Response
 from fenics_hytf.lapse.scheme import Scheme
 from fenics_hytf.lapse.slipped import Slipped
-from fenics_hytf.lapse.starts import largest, product, start_accelerations, start_columns
+from fenics_hytf.lapse.starts import product, start_accelerations, start_columns
 from fenics_hytf.motion import (
     LapseRecord,
     Segment,
@@ -77,11 +77,11 @@ class WholeRecord:
         return Excitation.on_contour(
             self._contour,
             self._scene.solver.max_frequency,
-            self._transform * later,
-            self._equations.axes,
-            segment,
-            self._motion,
-            self._start,
+            weights=self._transform * later,
+            axes=self._equations.axes,
+            segment=segment,
+            motion=self._motion,
+            start=self._start,
         )
 
     def begin(self, points: Points, excitation: Excitation) -> None:
@@ -138,15 +138,8 @@ class WholeRecord:
         """Displacement and velocity at the start of the lapse, against what was carried."""
         if not self._excitation.carries:
             return None
-        S, comm = transfer_matrix(points, self._domain.V), self._domain.comm
-        u, v = (
-            S @ self._equations.unknowns.expand(response.unknowns_at(0.0, order))
-            for order in (0, 1)
-        )
-        return (
-            largest(comm, u - points["dynamic_displacement"]),
-            largest(comm, v - points["dynamic_velocity"]),
-        )
+        carried = points["dynamic_displacement"]
+        return jump_at_start(self._domain, self._equations, points, response, carried)
 
     def energy(
         self,

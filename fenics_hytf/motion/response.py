@@ -36,16 +36,13 @@ Shorter ones follow the record so closely that what rings on top is a small part
 """
 
 
-def default_periods(num: int = 181) -> RealArray:
-    """Periods from 0.01 to 10 s, equally spaced in their logarithm.
-
-    Args:
-        num: How many; 181 are 60 a decade.
+def default_periods() -> RealArray:
+    """Periods from 0.01 to 10 s, 60 a decade, equally spaced in their logarithm.
 
     Returns:
-        [s], shape ``(num,)``.
+        [s], shape ``(181,)``.
     """
-    return np.geomspace(0.01, 10.0, num, dtype=np.float64)
+    return np.geomspace(0.01, 10.0, 181, dtype=np.float64)
 
 
 def response_spectrum(

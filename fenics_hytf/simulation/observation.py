@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What is seen of a lapse: receivers, the base, and the middle of every cell."""
+"""What is seen of a lapse, receivers, base and the middle of every cell, and the record of it."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from fenics_hytf.lapse import (
     CellProbe,
     CellState,
     Continuity,
+    Energy,
     Equations,
     Ground,
     Histories,
+    LapseResult,
     ReceiverProbe,
     Slipped,
     SlipResult,
@@ -25,7 +27,7 @@ from fenics_hytf.lapse import (
     outcrop_motion,
     within_motion,
 )
-from fenics_hytf.particles import Points
+from fenics_hytf.particles import MassLedger, Points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.receivers import Receivers
 
@@ -49,6 +51,62 @@ class Seen:
     outcrop: RealArray | None
     cells: CellState
     slip: SlipResult | None
+
+
+def lapse_result(
+    seen: Seen,
+    solved: Solved,
+    *,
+    index: int,
+    start_time: float,
+    jump: tuple[float, float] | None,
+    energy: Energy | None,
+    ledger: MassLedger,
+) -> LapseResult:
+    """What a lapse leaves behind.
+
+    Args:
+        seen: What was seen of it.
+        solved: Its solution.
+        index: Its number, from 0.
+        start_time: Time of its first sample [s].
+        jump: Of displacement [m] and velocity [m/s] at its start, ``None`` if nothing is carried.
+        energy: Its ledger of energy, or ``None``.
+        ledger: Points and their mass.
+
+    Returns:
+        The record.
+    """
+    excitation, histories, cells = solved.excitation, seen.histories, seen.cells
+    seam_error = None
+    if jump is not None:
+        peaks = float(cells.peak_displacement.max()), float(cells.peak_velocity.max())
+        seam_error = max(off / peak if peak else 0.0 for off, peak in zip(jump, peaks, strict=True))
+    return LapseResult(
+        index=index,
+        start_time=start_time,
+        num_samples=excitation.num_samples,
+        dt=excitation.dt,
+        excited_lines=excitation.excited,
+        solved_lines=len(excitation.lines),
+        factorisations=solved.tally.factorisations,
+        solves=solved.tally.solves,
+        worst_residual=float(solved.response.sweep.residuals.max(initial=0.0)),
+        loop=solved.loop,
+        frequency=excitation.frequency,
+        transfer=histories.transfer,
+        displacement=histories.displacement,
+        velocity=histories.velocity,
+        acceleration=histories.acceleration,
+        total_acceleration=histories.total_acceleration,
+        within=seen.within,
+        outcrop=seen.outcrop,
+        cells=cells,
+        seam_error=seam_error,
+        slip=seen.slip,
+        energy=energy,
+        ledger=ledger,
+    )
 
 
 class Observation:

@@ -25,9 +25,9 @@ class Work:
         excited_lines: Excited lines, summed over lapses.
         inverse_mappings: Points whose reference coordinates were searched by Newton iteration.
         assemblies: Assemblies by the name of the form: ``elasticity``, ``geometric``, ``mass``,
-            ``rayleigh``, ``dashpot``. A form that a scene does not call for has no entry.
-        wall_s: Wall seconds by phase: ``setup``, ``assembly``, ``sweep``, ``response``,
-            ``convection``, ``output``.
+            ``rayleigh``, ``dashpot``, ``ghost``. What a scene does not call for has no entry.
+        wall_s: Wall seconds by phase: ``setup``, ``assembly``, ``mechanism``, ``sweep``,
+            ``response``, ``convection``, ``output``.
     """
 
     factorisations: int = 0

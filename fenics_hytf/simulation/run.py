@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""A run: what lives from lapse to lapse, and the steps of the outer loop one by one."""
+"""A run: what lives from lapse to lapse, and the steps of the outer loop one by one.
+
+They stand here in the order in which :func:`~fenics_hytf.simulation.flow.simulate` takes them.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
 from fenics_hytf.lapse import (
-    CellState,
-    Continuity,
     CycleCount,
-    Energy,
     Equations,
     FreeField,
     Ground,
@@ -33,11 +34,7 @@ from fenics_hytf.lapse import (
     solve,
 )
 from fenics_hytf.motion import Segment
-from fenics_hytf.particles import (
-    gather_points,
-    scatter_points,
-    transfer_matrix,
-)
+from fenics_hytf.particles import gather_points, scatter_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.checkpoint import Checkpoint
@@ -45,7 +42,7 @@ from fenics_hytf.simulation.checkpoint_folder import CheckpointFolder
 from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.groups import Groups, require_same_parts
 from fenics_hytf.simulation.memory import peak_memory
-from fenics_hytf.simulation.observation import Observation
+from fenics_hytf.simulation.observation import Observation, lapse_result
 from fenics_hytf.simulation.records import (
     ProgressCallback,
     Result,
@@ -62,8 +59,30 @@ from fenics_hytf.simulation.weighing import Weighing
 RealArray = npt.NDArray[np.float64]
 
 
+class _Destroyable(Protocol):
+    """What holds PETSc objects."""
+
+    def destroy(self) -> None:
+        """Destroy them."""
+
+
+Owned = TypeVar("Owned", bound=_Destroyable)
+
+
 class Run:
-    """State that lives from lapse to lapse: mesh, points, equations, the warm start."""
+    """State that lives from lapse to lapse: mesh, points, equations, the warm start.
+
+    Args:
+        scene: The scene.
+        comm: Communicator of all ranks.
+        groups: Groups of ranks that share a mesh.
+        progress: Called on rank 0 while the run goes on, or ``None``.
+        strain_from: See :func:`~fenics_hytf.simulation.flow.simulate`.
+
+    Attributes:
+        lapses: Those that were solved.
+        points: The points where they are now.
+    """
 
     def __init__(
         self,
@@ -88,7 +107,7 @@ class Run:
         self._softening: Softening | None = None
         self._given_way: RealArray | float = 0.0
         self._start_field: RealArray | float = 0.0
-        self._owned: list[Equations | Continuity | Observation | Statics | Sliding | FreeField] = []
+        self._owned: list[_Destroyable] = []
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -97,52 +116,70 @@ class Run:
             domain = checked_domain(scene, self._groups.within)
             self.domain = replace(domain, across=self._groups.across)
             require_same_parts(self.domain)
-            self.free_fields = self._level_ground()
-            self.equations = Equations(scene, self.domain, self._assemblies, self.free_fields)
-            self._owned.append(self.equations)
-            self.statics = None if scene.effects.gravity is None else Statics(scene, self.domain)
-            if self.statics is not None:
-                self._owned.append(self.statics)
-            self.continuity: Continuity = choose_continuity(
-                scene, self.domain, self.equations, self.statics
+            self.free_fields = [  # a column beyond each side that has one
+                self._own(FreeField(scene, self.domain, name, self._assemblies))
+                for name, kind in scene.boundary.kinds.items()
+                if kind == "free_field"
+            ]
+            equations = self.equations = self._own(
+                Equations(scene, self.domain, self._assemblies, self.free_fields)
             )
-            self._owned.append(self.continuity)
+            weighs = scene.effects.gravity is not None
+            statics = self.statics = self._own(Statics(scene, self.domain)) if weighs else None
+            continuity = self.continuity = self._own(
+                choose_continuity(scene, self.domain, equations, statics)
+            )
             if scene.effects.sliding is not None:
-                assert isinstance(self.continuity, Handover) and self.statics is not None
-                self._sliding = Sliding(
-                    scene, self.domain, self.equations, self.continuity, self.statics
+                assert isinstance(continuity, Handover) and statics is not None
+                self._sliding = self._own(
+                    Sliding(scene, self.domain, equations, continuity, statics)
                 )
-                self._owned.append(self._sliding)
             if scene.effects.softening:
-                assert self.statics is not None
-                self._softening = Softening(self.domain, self.statics)
-            self.points = seed_points(scene, self.domain, self.continuity.fields)
-            self.observation = Observation(
-                scene, self.domain, self.equations, self.continuity, self.points
+                assert statics is not None
+                self._softening = Softening(self.domain, statics)
+            self.points = seed_points(scene, self.domain, continuity.fields)
+            self.observation = self._own(
+                Observation(scene, self.domain, equations, continuity, self.points)
             )
-            self._owned.append(self.observation)
-            self._weighing = Weighing(
-                scene, self.domain, self.equations, self.observation, self.statics
-            )
+            self._weighing = Weighing(scene, self.domain, equations, self.observation, statics)
             cycles = scene.effects.degradation
             self._cycles = None if cycles is None else CycleCount(cycles, self.domain)
-            names = self.domain.region_names
-            self._density = np.array([scene.soil[name].density for name in names])
+            self._density = np.array([scene.soil[name].density for name in domain.region_names])
         self._ledger = self.points.ledger(self.domain.comm)
 
-    def _level_ground(self) -> list[FreeField]:
-        """A column beyond each side with free field."""
-        columns = []
-        for name, kind in self.scene.boundary.kinds.items():
-            if kind == "free_field":
-                columns.append(FreeField(self.scene, self.domain, name, self._assemblies))
-                self._owned.append(columns[-1])
-        return columns
+    def _own(self, made: Owned) -> Owned:
+        """Note what is to be destroyed with the run."""
+        self._owned.append(made)
+        return made
 
-    def destroy(self) -> None:
-        """Destroy all PETSc objects."""
-        for owned in self._owned:
-            owned.destroy()
+    def restore(self, found: Checkpoint) -> None:
+        """Go on from a checkpoint."""
+        state = RunState.load(found)
+        self.lapses = list(state.lapses)
+        self.points = scatter_points(state.points, self.domain.mesh)
+        self._ledger = state.ledger
+        self.observation.carried = state.carried
+        self.observation.base_carried = state.base_carried
+        self._effective_strain = state.effective_strain
+        for column, column_state in zip(self.free_fields, state.free_fields, strict=True):
+            column.restore(column_state)
+        if self._cycles is not None and state.cycles is not None:
+            self._cycles.state = state.cycles
+        if self._sliding is not None:
+            self._sliding.state = state.sliding
+        self.weigh()
+        # Matrices that are there again were counted when they were first made.
+        self._assemblies.clear()
+        self._assemblies.update(state.work.assemblies)
+        for phase, seconds in state.work.wall_s.items():
+            self.clock.wall_s[phase] = self.clock.wall_s.get(phase, 0.0) + seconds
+        self._work = replace(state.work, wall_s=self.clock.wall_s)
+
+    def segments(self) -> Iterator[Segment]:
+        """The lapses that are left; see :func:`~fenics_hytf.simulation.schedule.lapses_to_go`."""
+        sliding = self._sliding
+        moving = None if sliding is None else lambda: sliding.moving
+        return lapses_to_go(self.scene, self.lapses, moving)
 
     def weigh(self) -> None:
         """M = SᵀM_pS (4), K_NL and the soil of each cell, from the points where they are now."""
@@ -171,7 +208,6 @@ class Run:
         with self.clock.phase("assembly"):
             excitation = self.continuity.excite(segment)
             self.continuity.begin(self.points, excitation)
-        observer = self._report.observer(index)
         for column in self.free_fields:
             self._count(column.solve(segment, self._report.observer(index, column.name)))
         start = self._effective_strain  # of the lapse before
@@ -182,10 +218,10 @@ class Run:
             excitation,
             self.continuity,
             self.observation.probe,
-            first_strain(self.scene, ground) if start is None else start,
-            observer,
-            self._strain_from,
-            self._sliding,
+            start=first_strain(self.scene, ground) if start is None else start,
+            observer=self._report.observer(index),
+            strain_from=self._strain_from,
+            sliding=self._sliding,
         )
         self._effective_strain = solved.effective_strain
         self._count(solved)
@@ -201,49 +237,22 @@ class Run:
         assert self._ground is not None
         with self.clock.phase("response"):
             seen = self.observation.see(solved, self._ground, self.points)
-            seam_error, energy = self._seam_error(solved, seen.cells), self._energy(solved)
-        excitation, response = solved.excitation, solved.response
+            jump = self.continuity.jump(self.points, solved.response)
+            before = self.lapses[-1].energy if self.lapses else None
+            stored = None if before is None else before.stored[1]
+            energy = self.continuity.energy(solved.response, solved.material, stored, solved.slip)
         self.lapses.append(
-            LapseResult(
+            lapse_result(
+                seen,
+                solved,
                 index=index,
                 start_time=start * self.scene.dt,
-                num_samples=excitation.num_samples,
-                dt=self.scene.dt,
-                excited_lines=excitation.excited,
-                solved_lines=len(excitation.lines),
-                factorisations=solved.tally.factorisations,
-                solves=solved.tally.solves,
-                worst_residual=float(response.sweep.residuals.max(initial=0.0)),
-                loop=solved.loop,
-                frequency=excitation.frequency,
-                transfer=seen.histories.transfer,
-                displacement=seen.histories.displacement,
-                velocity=seen.histories.velocity,
-                acceleration=seen.histories.acceleration,
-                total_acceleration=seen.histories.total_acceleration,
-                within=seen.within,
-                outcrop=seen.outcrop,
-                cells=seen.cells,
-                seam_error=seam_error,
-                slip=seen.slip,
+                jump=jump,
                 energy=energy,
                 ledger=self._ledger,
             )
         )
         self._report(index, "lapse", residual=self.lapses[-1].worst_residual)
-
-    def _seam_error(self, solved: Solved, cells: CellState) -> float | None:
-        """Jumps at the start of the lapse over the peaks in it."""
-        jump = self.continuity.jump(self.points, solved.response)
-        if jump is None:
-            return None
-        peaks = float(cells.peak_displacement.max()), float(cells.peak_velocity.max())
-        return max(off / peak if peak else 0.0 for off, peak in zip(jump, peaks, strict=True))
-
-    def _energy(self, solved: Solved) -> Energy | None:
-        before = self.lapses[-1].energy if self.lapses else None
-        stored = None if before is None else before.stored[1]
-        return self.continuity.energy(solved.response, solved.material, stored, solved.slip)
 
     def count_cycles(self, solved: Solved) -> None:
         """Cycles of the lapse lower the shear modulus of the next."""
@@ -269,14 +278,8 @@ class Run:
         """What a field of the lapse is added to [m]: of the nodes, relative to the base."""
         if not self.continuity.goes_on_from_nought:
             return 0.0
-        S = transfer_matrix(self.points, self.domain.V)
         carried = self.points["dynamic_displacement"] - self.observation.base_before
-        momentum = self.equations.unknowns.collect(
-            (S.T @ (self.points.mass[:, None] * carried)).ravel()
-        )
-        field = self.equations.unknowns.expand(self.equations.inertia.accelerate(momentum))
-        momentum.destroy()
-        return field
+        return self.equations.field_of(self.points, carried)
 
     def soften(self, solved: Solved) -> None:
         """Static stress falls where G is lower than ever before, and the ground gives way."""
@@ -308,23 +311,17 @@ class Run:
                 self.domain,
                 self.points,
                 u - self._nodal_motion(solved, 0.0) + self._given_way,
-                self.scene.points.outside,
+                outside=self.scene.points.outside,
                 # Softening has strained the static stress itself, and vibration does not.
-                solved.material.real if self._softening is None else None,
-                v if slip is None else v + slip.at_end(1),
-                a if slip is None else a + slip.at_end(2),
-                self._density,
-                None if slip is None else slip.at_end(),
+                constants=solved.material.real if self._softening is None else None,
+                velocity=v if slip is None else v + slip.at_end(1),
+                acceleration=a if slip is None else a + slip.at_end(2),
+                density=self._density,
+                slip=None if slip is None else slip.at_end(),
             )
         self._ledger = report.ledger
         self._work.inverse_mappings += report.inverse_mappings
         self.lapses[-1] = replace(self.lapses[-1], ledger=report.ledger)
-
-    def segments(self) -> Iterator[Segment]:
-        """The lapses that are left; see :func:`~fenics_hytf.simulation.schedule.lapses_to_go`."""
-        sliding = self._sliding
-        moving = None if sliding is None else lambda: sliding.moving
-        return lapses_to_go(self.scene, self.lapses, moving)
 
     def _nodal_motion(self, solved: Solved, time: float, derivative: int = 0) -> RealArray:
         """Displacement of the nodes relative to the base, or a time derivative of it."""
@@ -369,29 +366,6 @@ class Run:
             )
             checkpoint.save(len(self.lapses) - 1, self.domain.comm.size, state.parts())
 
-    def restore(self, found: Checkpoint) -> None:
-        """Go on from a checkpoint."""
-        state = RunState.load(found)
-        self.lapses = list(state.lapses)
-        self.points = scatter_points(state.points, self.domain.mesh)
-        self._ledger = state.ledger
-        self.observation.carried = state.carried
-        self.observation.base_carried = state.base_carried
-        self._effective_strain = state.effective_strain
-        for column, column_state in zip(self.free_fields, state.free_fields, strict=True):
-            column.restore(column_state)
-        if self._cycles is not None and state.cycles is not None:
-            self._cycles.state = state.cycles
-        if self._sliding is not None:
-            self._sliding.state = state.sliding
-        self.weigh()
-        # Matrices that are there again were counted when they were first made.
-        self._assemblies.clear()
-        self._assemblies.update(state.work.assemblies)
-        for phase, seconds in state.work.wall_s.items():
-            self.clock.wall_s[phase] = self.clock.wall_s.get(phase, 0.0) + seconds
-        self._work = replace(state.work, wall_s=self.clock.wall_s)
-
     def result(self) -> Result:
         """Everything so far."""
         self._work.assemblies = dict(self._assemblies)
@@ -415,3 +389,8 @@ class Run:
             work=self._work,
             peak_memory=self.comm.allreduce(peak_memory(), MPI.MAX),
         )
+
+    def destroy(self) -> None:
+        """Destroy all PETSc objects."""
+        for owned in self._owned:
+            owned.destroy()

@@ -75,12 +75,12 @@ def take_snapshot(
         lapse.index,
         time,
         everyone,
-        vertices,
-        connectivity,
-        _MESHIO[domain.mesh.topology.cell_name()],
-        fields,
-        _cell_fields(lapse) if scene.output.fields else {},
-        slides,
+        vertices=vertices,
+        cells=connectivity,
+        cell_type=_MESHIO[domain.mesh.topology.cell_name()],
+        vertex_fields=fields,
+        cell_fields=_cell_fields(lapse) if scene.output.fields else {},
+        with_mesh=slides,
     )
 
 

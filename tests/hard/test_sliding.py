@@ -173,8 +173,8 @@ def test_33_a_cell_without_a_point_is_no_hole(monkeypatch, figure):
     whole = simulate(Scene.from_dict(data)).lapses[1]
     convect = steps.convect
 
-    def left(domain, points, *arguments):
-        report = convect(domain, points, *arguments)
+    def left(domain, points, *arguments, **others):
+        report = convect(domain, points, *arguments, **others)
         empty_a_cell(domain.mesh, points, [8.5, 2.5])  # in the slip surface
         return report
 

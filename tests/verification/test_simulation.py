@@ -50,11 +50,11 @@ def test_an_error_names_its_lapse_and_keeps_the_lapses_before(monkeypatch):
     calls = []
     original = steps.convect
 
-    def fail_in_the_third(*arguments):
+    def fail_in_the_third(*arguments, **others):
         calls.append(arguments)
         if len(calls) == 3:
             raise PointsOutside("point 7 left")
-        return original(*arguments)
+        return original(*arguments, **others)
 
     monkeypatch.setattr(steps, "convect", fail_in_the_third)
     with pytest.raises(SimulationError, match="lapse 2: point 7 left") as caught:
@@ -85,10 +85,10 @@ def test_an_undamped_resonance_is_named():
 def test_a_rider_whose_point_has_left_is_not_a_number(monkeypatch):
     original = steps.convect
 
-    def carry_off(domain, points, increment, *arguments):
+    def carry_off(domain, points, increment, **others):
         increment = increment.copy()
         increment[:, 1] += 1.5  # what lies in the upper 1.5 m leaves through the top
-        return original(domain, points, increment, *arguments)
+        return original(domain, points, increment, **others)
 
     monkeypatch.setattr(steps, "convect", carry_off)
     place = {"receivers": {"rider": {"point": [0.5, 3.5]}}}
