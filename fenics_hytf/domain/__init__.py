@@ -6,12 +6,11 @@ from fenics_hytf.domain.checks import jacobian_determinants, refuse_inverted_cel
 from fenics_hytf.domain.constraints import boundary_nodes, constraint_matrix, normal_axis
 from fenics_hytf.domain.domain import Domain, build, examine, make_domain
 from fenics_hytf.domain.grids import MeshData
-from fenics_hytf.domain.side import SideColumn, distance_to_sides, side_column
+from fenics_hytf.domain.side import distance_to_sides, side_column
 
 __all__ = [
     "Domain",
     "MeshData",
-    "SideColumn",
     "bare_nodes",
     "boundary_nodes",
     "build",

@@ -15,7 +15,7 @@ from fenics_hytf.frequency.inertia import negative_eigenvalues
 from fenics_hytf.frequency.loads import AffineLoads, Loads
 from fenics_hytf.frequency.products import multiply, real_rows
 from fenics_hytf.frequency.reduced import ReducedSweep, reduced_sweep
-from fenics_hytf.frequency.sweep import DenseSweep, JoinedSweep, Sweep
+from fenics_hytf.frequency.sweep import JoinedSweep, Sweep
 from fenics_hytf.frequency.system import (
     DynamicSystem,
     ScalarFunction,
@@ -27,7 +27,6 @@ from fenics_hytf.frequency.system import (
 __all__ = [
     "AffineLoads",
     "Columns",
-    "DenseSweep",
     "DynamicSystem",
     "FactorisationError",
     "JoinedSweep",

@@ -2,13 +2,13 @@
 """One lapse: ground, equations, the equivalent-linear loop, response, what slips, convection."""
 
 from fenics_hytf.lapse.base import BaseProbe, outcrop_motion, within_motion
-from fenics_hytf.lapse.cells import CarriedCells, CellPeaks, CellProbe
+from fenics_hytf.lapse.cells import CellPeaks, CellProbe
 from fenics_hytf.lapse.choice import choose_continuity
-from fenics_hytf.lapse.continuity import Continuity, Steady, excite
+from fenics_hytf.lapse.continuity import Continuity, excite
 from fenics_hytf.lapse.convective import cell_stress, convect
 from fenics_hytf.lapse.cycles import CycleCount
 from fenics_hytf.lapse.energy import Energy
-from fenics_hytf.lapse.equations import Equations, LapseEquations
+from fenics_hytf.lapse.equations import Equations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
 from fenics_hytf.lapse.errors import (
     BalanceError,
@@ -30,7 +30,6 @@ from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.records import (
     CellState,
     LapseResult,
-    LoopHistory,
     SlipResult,
     SofteningResult,
 )
@@ -43,13 +42,11 @@ from fenics_hytf.lapse.slope import Slope
 from fenics_hytf.lapse.softening import Softening
 from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.lapse.unknowns import Unknowns
-from fenics_hytf.lapse.whole_record import WholeRecord
 
 __all__ = [
     "Anderson",
     "BalanceError",
     "BaseProbe",
-    "CarriedCells",
     "CellPeaks",
     "CellProbe",
     "CellState",
@@ -70,10 +67,8 @@ __all__ = [
     "Ground",
     "Handover",
     "Histories",
-    "LapseEquations",
     "LapseError",
     "LapseResult",
-    "LoopHistory",
     "Material",
     "Mechanism",
     "MechanismError",
@@ -94,10 +89,8 @@ __all__ = [
     "Solved",
     "Spectra",
     "Statics",
-    "Steady",
     "Unknowns",
     "VolumeError",
-    "WholeRecord",
     "cell_stress",
     "choose_continuity",
     "column_supports",

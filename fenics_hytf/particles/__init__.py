@@ -12,7 +12,6 @@ from fenics_hytf.particles.kinematics import (
     to_tensor,
     update_kinematics,
     update_stress,
-    update_volume,
 )
 from fenics_hytf.particles.ledger import MassLedger
 from fenics_hytf.particles.mapping import inverse_map
@@ -26,7 +25,7 @@ from fenics_hytf.particles.move import (
 from fenics_hytf.particles.pieces import carry_pieces, first_pieces, piece_integrals
 from fenics_hytf.particles.points import Points, quadrature_rule, seed
 from fenics_hytf.particles.resample import resample_matrix
-from fenics_hytf.particles.search import CellSearch, locate, resolve_owners
+from fenics_hytf.particles.search import locate, resolve_owners
 from fenics_hytf.particles.sites import Located, Sites, cell_centres
 from fenics_hytf.particles.store import gather_points, scatter_points
 from fenics_hytf.particles.transfer import (
@@ -37,7 +36,6 @@ from fenics_hytf.particles.transfer import (
 from fenics_hytf.scene import default_points_per_cell
 
 __all__ = [
-    "CellSearch",
     "Located",
     "MassLedger",
     "MoveReport",
@@ -69,5 +67,4 @@ __all__ = [
     "transfer_matrix",
     "update_kinematics",
     "update_stress",
-    "update_volume",
 ]

@@ -2,7 +2,6 @@
 """The outer loop over lapses, and what it leaves behind."""
 
 from fenics_hytf.simulation.check import mesh_faults
-from fenics_hytf.simulation.checkpoint import Checkpoint
 from fenics_hytf.simulation.checkpoint_folder import CheckpointFolder
 from fenics_hytf.simulation.errors import CheckpointError, SimulationError
 from fenics_hytf.simulation.flow import simulate
@@ -20,7 +19,6 @@ from fenics_hytf.simulation.records import (
 from fenics_hytf.simulation.stability import factor_of_safety
 
 __all__ = [
-    "Checkpoint",
     "CheckpointError",
     "CheckpointFolder",
     "Inspection",

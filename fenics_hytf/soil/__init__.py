@@ -5,11 +5,9 @@ from fenics_hytf.soil.complex_modulus import COMPLEX_MODULUS, complex_factor, wa
 from fenics_hytf.soil.curves import Curve
 from fenics_hytf.soil.darendeli import darendeli
 from fenics_hytf.soil.degradation import (
-    Cycles,
     CyclicState,
     DegradationLaw,
     continue_count,
-    count_cycles,
     open_cycles,
 )
 from fenics_hytf.soil.elastic import Elastic
@@ -38,7 +36,6 @@ __all__ = [
     "RELAXATION_TIMES",
     "Curve",
     "CurveFileError",
-    "Cycles",
     "CyclicState",
     "DegradationLaw",
     "Elastic",
@@ -47,7 +44,6 @@ __all__ = [
     "branches",
     "complex_factor",
     "continue_count",
-    "count_cycles",
     "curve_from_model",
     "darendeli",
     "epri_1993_pi",

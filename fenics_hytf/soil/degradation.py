@@ -62,27 +62,6 @@ class Cycles:
     count: RealArray
 
 
-def count_cycles(history: npt.ArrayLike) -> Cycles:
-    """Count the cycles of a whole history; what is open at its end counts as half cycles.
-
-    Args:
-        history: Signed shear strain [-], shape ``(num_samples,)``.
-
-    Returns:
-        The cycles and half cycles.
-
-    Raises:
-        ValueError: If the history is not a row of at least one finite number.
-        ImportError: If the package rainflow is not installed.
-    """
-    closed, residue = continue_count(history)
-    pending = open_cycles(residue)
-    return Cycles(
-        np.concatenate([closed.amplitude, pending.amplitude]),
-        np.concatenate([closed.count, pending.count]),
-    )
-
-
 def continue_count(
     history: npt.ArrayLike, residue: npt.ArrayLike = (), smallest: float = 0.0
 ) -> tuple[Cycles, RealArray]:
@@ -233,25 +212,6 @@ class DegradationLaw:
             inverse = before ** (1.0 / t)
             after = before * np.exp(-t * np.log1p(number * inverse))
         return np.asarray(np.clip(after, self.minimum, before))
-
-    def after_history(self, index: float, history: npt.ArrayLike) -> float:
-        """The degradation index after a whole history.
-
-        Args:
-            index: δ before [-].
-            history: Signed shear strain [-], shape ``(num_samples,)``.
-
-        Returns:
-            δ after [-], what is open at the end counted as half cycles.
-
-        Raises:
-            ValueError: If an argument is out of range.
-            ImportError: If the package rainflow is not installed.
-        """
-        strain = _checked(history, 1)
-        if np.ptp(strain) <= 2.0 * self.threshold:
-            return float(self.degrade(index, 0.0))
-        return float(self._through(np.array([index]), [count_cycles(strain)])[0])
 
     def after_lapse(
         self,

@@ -8,7 +8,6 @@ scene: what each of its settings costs, and what error it leaves.
 from fenics_hytf.study.conduct import conduct
 from fenics_hytf.study.records import (
     BudgetSpent,
-    Point,
     Study,
     StudyCallback,
     StudyError,
@@ -18,7 +17,6 @@ from fenics_hytf.study.runs import Processes
 
 __all__ = [
     "BudgetSpent",
-    "Point",
     "Processes",
     "Study",
     "StudyCallback",
