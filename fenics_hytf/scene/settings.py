@@ -166,7 +166,8 @@ class Sliding(Table):
     Attributes:
         time_step: Of the march of the slip, at most [s]. 5 ms are short enough for the slip of a
             lapse; for lapses that hand over what slip excites, 1.25 ms keep the seams to 0.5 %.
-        new_mechanism: Slip after which a new mechanism is sought, over the size of a cell [-].
+        new_mechanism: Slip after which a new mechanism is sought where points move, over the
+            shortest edge of the mesh [-].
         unstable_at_rest: Whether the slope may be one that does not stand under its weight.
         longest: How long it may go on after the end of the motion to come to rest [s].
     """

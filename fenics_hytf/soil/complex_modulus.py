@@ -20,77 +20,21 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+RealArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 
-def hysteretic(damping: npt.ArrayLike) -> ComplexArray:
-    """G*/G = 1 + 2iD.
-
-    Args:
-        damping: Damping ratio D [-], any shape, in [0, 1).
-
-    Returns:
-        G*/G [-], the shape of ``damping``.
-
-    Raises:
-        ValueError: If a damping ratio is out of range.
-    """
-    d = _checked(damping, "hysteretic", 1.0)
-    return np.asarray(1.0 + 2j * d)
-
-
-def kramer(damping: npt.ArrayLike) -> ComplexArray:
-    """G*/G = 1 - D² + 2iD.
-
-    Args:
-        damping: Damping ratio D [-], any shape, in [0, 1).
-
-    Returns:
-        G*/G [-], the shape of ``damping``.
-
-    Raises:
-        ValueError: If a damping ratio is out of range.
-    """
-    d = _checked(damping, "kramer", 1.0)
-    return np.asarray(1.0 - d**2 + 2j * d)
-
-
-def shake91(damping: npt.ArrayLike) -> ComplexArray:
-    """G*/G = 1 - 2D² + 2iD √(1 - D²).
-
-    Args:
-        damping: Damping ratio D [-], any shape, in [0, 1).
-
-    Returns:
-        G*/G [-], the shape of ``damping``.
-
-    Raises:
-        ValueError: If a damping ratio is out of range.
-    """
-    d = _checked(damping, "shake91", 1.0)
-    return np.asarray(1.0 - 2.0 * d**2 + 2j * d * np.sqrt(1.0 - d**2))
-
-
-def dormieux(damping: npt.ArrayLike) -> ComplexArray:
-    """G*/G = √(1 - 4D²) + 2iD.
-
-    Args:
-        damping: Damping ratio D [-], any shape, in [0, 0.5).
-
-    Returns:
-        G*/G [-], the shape of ``damping``.
-
-    Raises:
-        ValueError: If a damping ratio is out of range.
-    """
-    d = _checked(damping, "dormieux", 0.5)
-    return np.asarray(np.sqrt(1.0 - 4.0 * d**2) + 2j * d)
-
-
-COMPLEX_MODULUS: Mapping[str, Callable[[npt.ArrayLike], ComplexArray]] = MappingProxyType(
-    {"hysteretic": hysteretic, "kramer": kramer, "shake91": shake91, "dormieux": dormieux}
+COMPLEX_MODULUS: Mapping[str, Callable[[RealArray], ComplexArray]] = MappingProxyType(
+    {
+        "hysteretic": lambda d: 1.0 + 2j * d,
+        "kramer": lambda d: 1.0 - d**2 + 2j * d,
+        "shake91": lambda d: 1.0 - 2.0 * d**2 + 2j * d * np.sqrt(1.0 - d**2),
+        "dormieux": lambda d: np.sqrt(1.0 - 4.0 * d**2) + 2j * d,
+    }
 )
-"""G*/G as a function of the damping ratio, by the name of the convention."""
+"""G*/G as a function of a damping ratio in range, by the name of the convention."""
+
+_LIMIT = {"dormieux": 0.5}  # of the damping ratio; 1 for the others
 
 
 def complex_factor(damping: npt.ArrayLike, convention: str = "hysteretic") -> ComplexArray:
@@ -110,7 +54,7 @@ def complex_factor(damping: npt.ArrayLike, convention: str = "hysteretic") -> Co
         raise ValueError(
             f"complex_modulus: found '{convention}'; expected one of {', '.join(COMPLEX_MODULUS)}"
         )
-    return COMPLEX_MODULUS[convention](damping)
+    return np.asarray(COMPLEX_MODULUS[convention](_checked(damping, convention)))
 
 
 def wave_factors(
@@ -137,9 +81,9 @@ def wave_factors(
     return 1 - share + share * shear, shear
 
 
-def _checked(damping: npt.ArrayLike, convention: str, limit: float) -> npt.NDArray[np.float64]:
-    """Damping ratios as an array, each in [0, limit)."""
-    values = np.asarray(damping, dtype=np.float64)
+def _checked(damping: npt.ArrayLike, convention: str) -> RealArray:
+    """Damping ratios as an array, each in the range of the convention."""
+    values, limit = np.asarray(damping, dtype=np.float64), _LIMIT.get(convention, 1.0)
     faulty = ~((values >= 0.0) & (values < limit))
     if faulty.any():
         raise ValueError(

@@ -13,8 +13,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from fenics_hytf.soil.curves import Curve, RealArray
-from fenics_hytf.soil.parameters import check
+from fenics_hytf.soil.curves import Curve
+from fenics_hytf.soil.parameters import at_index, check
 
 _STRAIN = (
     *(1e-6, 1.778e-6, 3.162e-6, 5.623e-6),
@@ -139,9 +139,8 @@ def epri_1993_pi(plasticity_index: float) -> Curve:
     lowest, highest = _PLASTICITY_INDEX[0], _PLASTICITY_INDEX[-1]
     inside = lowest <= plasticity_index <= highest
     check("plasticity_index", plasticity_index, inside, f"{lowest:g} to {highest:g}, in percent")
-
-    def at_index(table: tuple[tuple[float, ...], ...]) -> RealArray:
-        columns = zip(*table, strict=True)
-        return np.array([np.interp(plasticity_index, _PLASTICITY_INDEX, c) for c in columns])
-
-    return Curve(np.array(_STRAIN), at_index(_PLASTICITY_MODULUS), at_index(_PLASTICITY_DAMPING))
+    modulus, damping = (
+        at_index(plasticity_index, _PLASTICITY_INDEX, table)
+        for table in (_PLASTICITY_MODULUS, _PLASTICITY_DAMPING)
+    )
+    return Curve(np.array(_STRAIN), modulus, damping)

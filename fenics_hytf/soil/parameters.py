@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -45,6 +47,23 @@ def check_mean_stress(mean_stress: float) -> None:
 def check_cycles(cycles: float) -> None:
     """Refuse a number of cycles [-] below 1 or not finite (ValueError)."""
     check("cycles", cycles, 1.0 <= cycles < np.inf, "at least 1")
+
+
+def at_index(
+    plasticity_index: float, indices: Sequence[float], rows: Sequence[Sequence[float]]
+) -> RealArray:
+    """A column of a table by plasticity, linear between its rows.
+
+    Args:
+        plasticity_index: PI [%], in the range of the table.
+        indices: PI of the rows, increasing [%].
+        rows: G/G_max or damping ratio at the strains of the table [-], a row each.
+
+    Returns:
+        Shape ``(num_strains,)``.
+    """
+    columns = zip(*rows, strict=True)
+    return np.array([np.interp(plasticity_index, indices, column) for column in columns])
 
 
 def table_strains(strain: npt.ArrayLike | None, fine: bool = False) -> RealArray:

@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from fenics_hytf.soil.curves import Curve
+from fenics_hytf.soil.parameters import at_index, check
 
 _STRAIN = (1e-6, 3.16e-6, 1e-5, 3.16e-5, 1e-4, 3.16e-4, 1e-3, 3.16e-3, 1e-2)
 
@@ -66,21 +67,14 @@ def vucetic_dobry_1991(plasticity_index: float) -> Curve:
     Raises:
         ValueError: If the plasticity index is out of range.
     """
-    if not 0.0 <= plasticity_index <= _PLASTICITY_INDEX[-1]:
-        raise ValueError(
-            f"curves.plasticity_index: found {plasticity_index}; expected 0 to "
-            f"{_PLASTICITY_INDEX[-1]:g}, in percent"
-        )
-
-    def at_index(table: tuple[tuple[float, ...], ...]) -> list[float]:
-        columns = zip(*table, strict=True)
-        return [float(np.interp(plasticity_index, _PLASTICITY_INDEX, c)) for c in columns]
-
-    return Curve(
-        np.array(_STRAIN),
-        np.array(at_index(_VUCETIC_DOBRY_MODULUS)),
-        np.array(at_index(_VUCETIC_DOBRY_DAMPING)),
+    highest = _PLASTICITY_INDEX[-1]
+    inside = 0.0 <= plasticity_index <= highest
+    check("plasticity_index", plasticity_index, inside, f"0 to {highest:g}, in percent")
+    modulus, damping = (
+        at_index(plasticity_index, _PLASTICITY_INDEX, table)
+        for table in (_VUCETIC_DOBRY_MODULUS, _VUCETIC_DOBRY_DAMPING)
     )
+    return Curve(np.array(_STRAIN), modulus, damping)
 
 
 def seed_idriss_1970(bound: str = "mean") -> Curve:
