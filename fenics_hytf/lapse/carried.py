@@ -68,7 +68,16 @@ class State:
 
 
 def stress_of(state: State, material: Material, cells: npt.NDArray[np.int64]) -> RealArray:
-    """Σ_j D_j of the strains that the parts act on."""
+    """Σ_j D_j of the strains that the parts act on.
+
+    Args:
+        state: What points carry.
+        material: The law of every cell.
+        cells: Cell of each point in the order of the input, shape ``(n,)``.
+
+    Returns:
+        Stress [Pa], shape ``(n, num_strains)``.
+    """
     total = np.zeros_like(state.strain)
     for part in material.parts:
         total += isotropic_stress(state.strain_of(part), *part.constants.at(cells))
@@ -81,7 +90,14 @@ def fading(relaxation_time: float | None, s: ComplexArray) -> ComplexArray:
 
 
 def half_of_normal(stress: RealArray) -> RealArray:
-    """Stress in the measure of G times Voigt strain: half the normal deviator, and shear."""
+    """Stress in the measure of G times Voigt strain: half the normal deviator, and shear.
+
+    Args:
+        stress: Voigt components [Pa], shape ``(n, num_strains)``.
+
+    Returns:
+        [Pa], shaped like ``stress``.
+    """
     normal = NORMAL_STRAINS[stress.shape[1]]
     measure = stress.copy()
     if normal:

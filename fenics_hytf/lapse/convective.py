@@ -61,9 +61,11 @@ def convect(
         constants: Elastic constants of every cell in the order of the input, for points that carry
             stress. Where lapses hand over, what the strain adds is the dynamic stress that points
             carry besides, and the static one only goes with the ground.
-        velocity: At the nodes at the end of the lapse [m/s], for points that carry it.
+        velocity: At the nodes at the end of the lapse [m/s], for points that carry it, shaped like
+            the increment.
         acceleration: Likewise [m/s^2].
-        density: Of each region when it was seeded [kg/m^3], to know a point's volume then.
+        density: Of each region when it was seeded [kg/m^3], to know a point's volume then, shape
+            ``(num_regions,)``.
         slip: Plastic part λφ of the increment, likewise; it turns stress and adds none.
 
     Returns:

@@ -54,7 +54,7 @@ class CycleCount:
             probe: Evaluates the strain in the cells.
             response: The response of the lapse.
             carried: What the lapse began with.
-            region: Soil of every cell.
+            region: Soil of every cell in the order of the input, shape ``(num_cells,)``.
         """
         found = []
         for some, strain in probe.strains(response, carried):

@@ -80,7 +80,8 @@ def iterate(
         peak_strain: Solves with given moduli; called with them and the iteration (from 1), returns
             the peak strain of every cell [-], shape ``(num_cells,)``.
         report: Called with the iteration and its change.
-        strain_from: For every cell the cell whose strain rules its moduli; itself if ``None``.
+        strain_from: For every cell the cell whose strain rules its moduli, shape ``(num_cells,)``;
+            itself if ``None``.
 
     Returns:
         The moduli that the last response was solved with, the effective strain of that response,

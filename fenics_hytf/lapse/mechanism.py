@@ -143,8 +143,9 @@ class MechanismSearch:
                 the Gauss points of owned cells, shape ``(num_owned_cells, num_gauss_points)``.
             gravity: Weight f_g on the unknowns [N, in 2D N/m]; ``None`` for none.
             driving: Force of inertia f_h at 1 g, downslope, on the unknowns, likewise.
-            start: An earlier mechanism's field, where the search begins; it is not used where the
-                driving force does no work in it.
+            start: An earlier mechanism's field, where the search begins, shape
+                ``(num_local_nodes, num_components)``; it is not used where the driving force does
+                no work in it.
 
         Returns:
             The mechanism.
@@ -173,10 +174,10 @@ class MechanismSearch:
         times the strength: no factor of safety follows from that.
 
         Args:
-            unknowns: As for :meth:`find`, as are the others.
-            weight: Part of each local cell that is filled.
-            strength: Shear strength.
-            gravity: Weight on the unknowns.
+            unknowns: As for :meth:`find`.
+            weight: Likewise.
+            strength: Likewise.
+            gravity: Likewise.
 
         Returns:
             The factor of safety [-]; infinite where gravity shears nothing.

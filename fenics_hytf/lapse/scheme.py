@@ -38,7 +38,17 @@ class Scheme:
     remembers: bool = False
 
     def num_lines(self, max_frequency: float | None) -> int:
-        """Lines of a lapse on the contour up to a frequency [Hz]; up to Nyquist's if ``None``."""
+        """Lines of a lapse on the contour.
+
+        Args:
+            max_frequency: Of the last line [Hz]; the Nyquist frequency if ``None``.
+
+        Returns:
+            Their number.
+
+        Raises:
+            ValueError: Under ``steady``, which has no contour.
+        """
         if self.contour is None:
             raise ValueError("found steady continuity; expected one on a damped contour")
         return len(self.contour.lines(max_frequency))

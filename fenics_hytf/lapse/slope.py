@@ -127,7 +127,8 @@ class Slope:
         Args:
             inertia: Force of inertia at the nodes under a unit of acceleration [kg, in 2D kg/m].
             scale: Acceleration of gravity, its sign the sense that drives [m/s^2].
-            start: An earlier mechanism's field, where the search begins.
+            start: An earlier mechanism's field, where the search begins, shape
+                ``(num_local_nodes, num_components)``.
 
         Returns:
             The mechanism.

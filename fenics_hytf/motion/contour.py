@@ -186,10 +186,10 @@ class StartFunctions:
 
         Args:
             relaxation_time: τ [s].
-            time: Instants [s].
+            time: Instants [s], shape ``(n,)``.
 
         Returns:
-            Shape ``(4, len(time))``.
+            Shape ``(4, n)``.
         """
         a, values = 1 / relaxation_time, self.at(time)
         found = np.empty_like(values)

@@ -70,7 +70,7 @@ def table_strains(strain: npt.ArrayLike | None, fine: bool = False) -> RealArray
     """Shear strains at which a model is tabulated.
 
     Args:
-        strain: Those asked for [-], or ``None``.
+        strain: Those asked for [-], shape ``(num_points,)``, or ``None``.
         fine: Whether the model's own are ten a decade from 1e-6 to 0.1; else they are 20 from 1e-6
             to 10^-1.5, with which the families after Darendeli (2001) are tabulated elsewhere.
 

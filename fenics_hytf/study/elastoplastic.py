@@ -258,7 +258,7 @@ class Section:
             drive: −ü_b [m/s^2], shape ``(num_samples, 2)``.
             step: From sample to sample [s].
             substeps: Steps a sample; ``None`` for those that stability asks for.
-            watched: Nodes.
+            watched: Nodes, shape ``(num_watched,)``.
 
         Returns:
             Displacement of the watched nodes less that at the start [m], shape ``(num_watched, 2,
