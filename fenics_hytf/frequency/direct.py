@@ -29,7 +29,6 @@ _PREFIX = "hytf_direct_"
 # is on it: of sixteen digits fewer than six would be left.
 RESONANCE = 1e10
 
-
 _FEW = 200  # unknowns; a cell has 81 at most
 
 # PETSc's own LDLᵀ has no start-up cost: on a column of 192 unknowns it took a quarter of MUMPS'

@@ -107,7 +107,7 @@ class Equations:
         self._assemblies = assemblies
         self._elastic = ElasticForm(domain, scene.effects.locking)
         self._geometric = GeometricForm(domain) if scene.effects.geometric_stiffness else None
-        self.axes = tuple(domain.components.index(m.direction) for m in scene.motion)
+        self.axes = tuple(map(domain.components.index, scene.directions))
         supports = scene.supports
         self.unknowns = Unknowns(domain, supports, self.axes)
         sides = [name for name, kind in supports.items() if kind in ("dashpot", "free_field")]

@@ -11,6 +11,7 @@ takes G(s)/G, with the bulk modulus kept its deviator does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,9 +89,18 @@ class Material:
     real: ElasticConstants
     parts: tuple[Part, ...]
 
-    def functions(self, s: ComplexArray) -> ComplexArray:
-        """f_j(s) of every part [-], shape ``(len(parts), num_lines)``."""
-        return np.array([[part.function(complex(z)) for z in s] for part in self.parts])
+
+def part_functions(parts: Sequence[Part], s: ComplexArray) -> ComplexArray:
+    """f_j(s) of some parts of a law.
+
+    Args:
+        parts: The parts.
+        s: Complex frequencies [rad/s], shape ``(num_lines,)``.
+
+    Returns:
+        [-], shape ``(len(parts), num_lines)``.
+    """
+    return np.array([[part.function(complex(z)) for z in s] for part in parts])
 
 
 def material(ground: Ground, moduli: Moduli, solver: Solver) -> Material:

@@ -22,7 +22,7 @@ from petsc4py import PETSc
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import Columns, Sweep
 from fenics_hytf.lapse.excitation import Excitation
-from fenics_hytf.lapse.material import Part
+from fenics_hytf.lapse.material import Part, part_functions
 from fenics_hytf.lapse.slipped import Slipped
 from fenics_hytf.operators import constrained_rows, displacement_rows, evaluate
 from fenics_hytf.particles import Sites, transfer_matrix
@@ -168,8 +168,8 @@ class Response:
             elif part.instantaneous == 1.0:
                 found.append(given.start.in_time(given.num_samples))
             else:
-                factor = np.array([part.function(complex(s)) for s in given.s])
-                found.append(given.to_time(factor * given.start_transform))
+                through = part_functions((part,), given.s) * given.start_transform
+                found.append(given.to_time(through))
         return np.stack(found)
 
     def unknowns_at(

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fenics_hytf.lapse.course import Course
-from fenics_hytf.lapse.material import Part
+from fenics_hytf.lapse.material import Part, part_functions
 from fenics_hytf.lapse.response import Response, Spectra
 
 RealArray = npt.NDArray[np.float64]
@@ -77,9 +77,8 @@ class _ByLines:
     """By way of spectra."""
 
     def __init__(self, response: Response, parts: tuple[Part, ...]) -> None:
-        s = response.excitation.s
         self._response, self._weighed = response, response.weighed()
-        self._functions = _functions(parts, s)
+        self._functions = part_functions(parts, response.excitation.s)
         held = response.start is not None and len(parts) > 0
         self._start = response.start_through(parts) if held else None
 
@@ -112,8 +111,8 @@ class _ByDirections:
         held = [None] * len(parts)
         if response.start is not None and parts:
             held = list(response.start_through(parts))
-        functions = _functions(parts, given.s)
-        through = [self._course.through(f, start) for f, start in zip(functions, held, strict=True)]
+        functions = part_functions(parts, given.s)
+        through = [self._course.through(functions[j], start) for j, start in enumerate(held)]
         self._through = self._told(np.concatenate(through)) if parts else None
 
     def _told(self, coordinates: RealArray) -> RealArray:
@@ -134,11 +133,6 @@ class _ByDirections:
         # All parts in one product, each part's coordinates met by the strain times its modulus.
         weighed = moduli[:, None, :, None].astype(seen.dtype) * seen[:, :, None, :]
         return _product(weighed.reshape(*seen.shape[:2], -1), self._through)
-
-
-def _functions(parts: tuple[Part, ...], s: npt.NDArray[np.complex128]) -> Any:
-    """f_j(s) of every part, shape ``(num_parts, num_lines)``."""
-    return np.array([[part.function(complex(z)) for z in s] for part in parts])
 
 
 def _product(seen: RealArray, coordinates: RealArray) -> RealArray:

@@ -23,11 +23,9 @@ from fenics_hytf.particles.points import Points
 # Where the components xx, yy(, zz, yz, xz), xy stand in the tensor.
 _PLACES = {3: ((0, 1, 0), (0, 1, 1)), 6: ((0, 1, 2, 1, 0, 0), (0, 1, 2, 2, 2, 1))}
 
-
 # Tensors that change within lapses and only turn with the ground between them, and what a shear
 # component stands for: γ = 2ε in strain.
 _TURNING = {"dynamic_strain": 2.0, "memory_strain": 2.0, "dynamic_stress": 1.0}
-
 
 _UNIT = 0.5  # norm up to which the exponential's series is summed as it is
 

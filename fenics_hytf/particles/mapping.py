@@ -43,9 +43,7 @@ from fenics_hytf.particles.kernels import map_points as _map_points
 
 SIZE_TOLERANCE = 1e-12  # of the cell's size
 ULP_TOLERANCE = 8.0 * float(np.finfo(np.float64).eps)  # of the coordinates
-MARGIN = (
-    1e-5  # added around a cell's boxes; wider than any tolerance, narrow enough to cost nothing
-)
+MARGIN = 1e-5  # around a cell's boxes: wider than any tolerance, narrow enough to cost nothing
 SINGULAR = 1e-12  # sine of the angle between the columns of J_c below which a cell has no map
 STARTS = 0.75  # further starts lie this far from the centre towards the nodes
 

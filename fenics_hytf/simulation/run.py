@@ -374,7 +374,7 @@ class Run:
             num_ranks=self.comm.size,
             group_size=self.domain.comm.size,
             components=self.domain.components,
-            directions=tuple(m.direction for m in self.scene.motion),
+            directions=self.scene.directions,
             receivers=self.observation.receivers.names,
             places=self.observation.receivers.places,
             region_names=self.domain.region_names,

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fenics_hytf.lapse import ElasticConstants, Ground, Material, Moduli, material
+from fenics_hytf.lapse.material import part_functions
 from fenics_hytf.scene import Solver
 from fenics_hytf.soil import RELAXATION_TIMES, maxwell_factor
 
@@ -40,7 +41,7 @@ def branches_of(found):
 def shear_of(found, s, cells):
     """G(s) of some cells [Pa], shape ``(len(cells), num_lines)``."""
     moduli = [part.constants.shear_modulus[cells] for part in found.parts]
-    return np.stack(moduli, axis=1) @ found.functions(s)
+    return np.stack(moduli, axis=1) @ part_functions(found.parts, s)
 
 
 def law(convention, keep="poisson", moduli=SECANT, ground=MIXED) -> Material:
