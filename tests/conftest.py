@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 from _pytest.terminal import TerminalReporter
+from support.figures import Figure
 
-_figures: list[tuple[str, float, str, float, str]] = []
+_figures: list[Figure] = []
 
 
 _other_ranks = io.StringIO()
@@ -38,10 +39,8 @@ def figure() -> Callable[..., None]:
     def require(
         name: str, measured: float, limit: float, unit: str = "", at_least: bool = False
     ) -> None:
-        sign = ">=" if at_least else "<="
-        _figures.append((name, measured, sign, limit, unit))
-        good = measured >= limit if at_least else measured <= limit
-        assert good, f"{name}: measured {measured:.4g}, wanted {sign} {limit:.4g} {unit}"
+        _figures.append(Figure(name, float(measured), float(limit), unit, at_least))
+        _figures[-1].require()
 
     return require
 
@@ -77,7 +76,7 @@ def pytest_terminal_summary(terminalreporter: TerminalReporter) -> None:
     if not _figures or MPI.COMM_WORLD.rank:
         return
     terminalreporter.section("measured against limit")
-    width = max(len(name) for name, *_ in _figures)
-    for name, measured, sign, limit, unit in _figures:
-        line = f"{name:<{width}}  {measured:12.4g}  {sign} {limit:<8.4g} {unit}"
-        terminalreporter.write_line(line.rstrip())
+    width = max(len(found.name) for found in _figures)
+    for found in _figures:
+        figures = f"{found.measured:12.4g}  {found.sign} {found.limit:<8.4g} {found.unit}"
+        terminalreporter.write_line(f"{found.name:<{width}}  {figures}".rstrip())

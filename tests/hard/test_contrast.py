@@ -97,18 +97,17 @@ def test_19_soil_on_and_in_rock(where, damping, sweep, figure):
     """Naively what is soft is lost beside what is stiff."""
     ground = Ground(SECTION, where, damping)
     found = sweep(ground.system, ground.loads, LINES, WANTED)
-    name = f"case 19, {where}, damping {damping:.0%}, {sweep.__name__}"
-    figure(f"{name}: residual", ground.residuals(found)[0].max(), WANTED)
+    figure(f"{where}: residual", ground.residuals(found)[0].max(), WANTED)
 
 
 @pytest.mark.parametrize("sweep", [direct_sweep, reduced_sweep])
 @pytest.mark.parametrize("damping", [0.0, 0.2])
 def test_19_in_space_and_at_degree_two(damping, sweep, figure):
+    """The same where rows sum more entries, and the contrast is within a cell's neighbours."""
     for name, mesh in (("block", BLOCK), ("degree 2", SECTION | {"degree": 2})):
         ground = Ground(mesh, "soil on rock", damping)
         found = sweep(ground.system, ground.loads, LINES[::5], WANTED)
-        name = f"case 19, {name}, damping {damping:.0%}, {sweep.__name__}"
-        figure(f"{name}: residual", ground.residuals(found)[0].max(), WANTED)
+        figure(f"soil on rock, {name}: residual", ground.residuals(found)[0].max(), WANTED)
 
 
 def left_by_the_exact_solution(A: sparse.csr_matrix, b: np.ndarray) -> tuple[np.ndarray, float]:
@@ -134,21 +133,34 @@ def left_by_the_exact_solution(A: sparse.csr_matrix, b: np.ndarray) -> tuple[np.
 @pytest.mark.parametrize("damping", [0.0, 0.05, 0.2])
 @pytest.mark.parametrize("where", ["rock on soil", "a boulder in soil"])
 def test_19_rock_that_rides_on_soil(where, damping, figure):
+    """Round-off of A x is what is left: solvers add nothing to it, and the answer is right."""
     ground = Ground(SECTION, where, damping)
-    name = f"case 19, {where}, damping {damping:.0%}"
     exact, left = left_by_the_exact_solution(ground.matrix(complex(LINES[0])), ground.b)
     # No solver leaves less: the reason why 1e-9 is not asked for here.
-    figure(f"{name}: residual of the exact solution in doubles", left, WANTED, at_least=True)
+    figure("rock on soil, the exact solution in doubles: residual", left, WANTED, at_least=True)
     direct = direct_sweep(ground.system, ground.loads, LINES, LOOSE)
     residuals, rounding = ground.residuals(direct)
     excess = (residuals / (WANTED + rounding)).max()
-    figure(f"{name}, direct_sweep: residual over 1e-9 and round-off", excess, 1.0)
+    figure("rock on soil, direct: residual over 1e-9 + round-off", excess, 1.0)
     error = np.linalg.norm(direct.solution(0)[:, 0] - exact) / np.linalg.norm(exact)
-    figure(f"{name}, direct_sweep: error", error, 1e-6)
+    figure("rock on soil, direct: error", error, 1e-6)
     # Its own sums, over a basis of some fifty directions, are off by a few times as much.
     asked = 10 * rounding.max()
     reduced = reduced_sweep(ground.system, ground.loads, LINES, asked)
-    figure(f"{name}, reduced_sweep: residual", ground.residuals(reduced)[0].max(), asked)
+    found = ground.residuals(reduced)[0].max()
+    figure("rock on soil, reduced: residual over round-off", found / rounding.max(), 10)
+
+
+@pytest.mark.xfail(
+    strict=True,
+    raises=AssertionError,
+    reason="x is held in doubles: rock that soil carries leaves eps·|A||x|, 3e-8 for the exact x",
+)
+def test_19_rock_on_soil_to_the_limit_of_the_case(figure):
+    """Of the undamped line at 0.5 Hz, by a solution that is exact to the last digit of a double."""
+    ground = Ground(SECTION, "rock on soil", 0.0)
+    _, left = left_by_the_exact_solution(ground.matrix(complex(LINES[0])), ground.b)
+    figure("rock on soil: residual", left, WANTED)
 
 
 SYMMETRIC = {
@@ -194,4 +206,4 @@ def test_19_the_matrix_is_symmetric(name, figure):
         assert s.imag == 0 or abs(scale @ (filled - filled.getH()) @ scale).max() > 1e-3
     A.destroy()
     # An entry sums the points of the cells that meet: 8 by 8 in a block, 64 roundings.
-    figure(f"case 19, {name}: A − Aᵀ over the diagonal", worst, 64 * np.finfo(float).eps)
+    figure("A − Aᵀ over the diagonal", worst, 64 * np.finfo(float).eps)

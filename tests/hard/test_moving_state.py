@@ -75,8 +75,8 @@ def test_28_a_rotation_keeps_the_volume(dim, figure):
         update_kinematics(points, gradient, 1e6, 1e6)
         naive *= np.linalg.det(np.eye(dim) + gradient)
     drift = np.abs(points.volume / before - 1).max()
-    figure(f"case 28, {dim}D: volume drift, {LAPSES} lapses of {TURN} rad", drift, 1e-12)
-    figure(f"case 28, {dim}D: naive drift", np.abs(naive / before - 1).max(), 0.5, at_least=True)
+    figure("volume drift of 50 lapses of 0.1 rad", drift, 1e-12)
+    figure("naive, det(I + ∇u): volume drift", np.abs(naive / before - 1).max(), 0.5, at_least=True)
 
 
 @pytest.mark.parametrize("dim", [2, 3])
@@ -91,14 +91,14 @@ def test_28_a_turned_block_keeps_its_invariants(dim, figure):
     for name in names:
         after = tensors_of(points, name)
         kept = np.abs(invariants(after) - invariants(before[name])).max()
-        figure(f"case 28, {dim}D: change of invariants of {name}", kept, 1e-10)
+        figure("change of invariants of stress and strain", kept, 1e-10)
         turned = np.abs(after - R @ before[name] @ R.T).max()
-        figure(f"case 28, {dim}D: {name} against R T R'", turned, 1e-10)
+        figure("stress and strain off R T Rᵀ", turned, 1e-10)
 
 
 @pytest.mark.parametrize("squeeze", [np.log(0.05), np.log(12.0)])
 @pytest.mark.parametrize("dim", [2, 3])
-def test_30_a_volume_that_collapses_is_a_typed_error(dim, squeeze):
+def test_30_a_volume_that_collapses_is_a_typed_error(dim, squeeze, figure):
     """Naively the points go on with a volume of nothing, or a negative one."""
     kind = "quadrilateral" if dim == 2 else "hexahedron"
     case = scene({"box": {"size": [4.0] * dim, "cells": [2] * dim, "cell": kind}}, ("clay",))
@@ -110,9 +110,11 @@ def test_30_a_volume_that_collapses_is_a_typed_error(dim, squeeze):
     increment[:, 0] = squeeze * (x[:, 0] - 2.0)
     with pytest.raises(VolumeError, match="volume has become") as caught:
         convect(domain, points, increment, "park", density=np.array([SOIL["density"]]))
-    assert caught.value.points == sorted(points.id.tolist())
-    for name, values in held.items():  # as they were
-        np.testing.assert_array_equal(points.arrays()[name], values)
+    unnamed = len(set(caught.value.points) ^ set(points.id.tolist()))
+    figure("points of J = 0.05 or 12 that are not named", unnamed, 0)
+    after = points.arrays()
+    changed = sum(int(np.sum(after[name] != values)) for name, values in held.items())
+    figure("values of points changed by a move that fails", changed, 0)
 
 
 @pytest.mark.parametrize("law", ["elastic", "viscous", "maxwell"])
@@ -138,6 +140,6 @@ def test_30_energy_is_accounted_for(dim, law, tmp_path, figure):
     )
     scale = max(max(abs(lapse.energy.input), *lapse.energy.stored) for lapse in result.lapses)
     open_ = max(abs(lapse.energy.imbalance) for lapse in result.lapses) / scale
-    figure(f"case 30, {dim}D, {law}: energy not accounted for", open_, 1e-3)
+    figure("|W_ext − W_damp − ΔE| over W", open_, 1e-3)
     seams = max(abs(lapse.energy.seam) for lapse in result.lapses) / scale
-    figure(f"case 30, {dim}D, {law}: energy made or lost at seams", seams, 1e-3)
+    figure("energy made or lost at seams over W", seams, 1e-3)

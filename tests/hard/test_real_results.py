@@ -128,7 +128,7 @@ def test_20_matrices_and_loads_are_real(name, tmp_path, figure):
     found += [entries(lapse.equations.T), entries(probe)]
     found += [vector.array_r for vector in (*lapse.loads, *lapse.equations.inertia.influence)]
     worst = max(imaginary_share(values) for values in found)
-    figure(f"case 20, {name}: imaginary part of matrices and loads", worst, NOTHING)
+    figure("imaginary part of matrices and loads", worst, NOTHING)
 
 
 @pytest.mark.parametrize("name", SOLVED_HERE)
@@ -160,7 +160,7 @@ def test_20_positions_are_real(name, tmp_path, figure):
         )
         q.destroy()
         nodes.destroy()
-    figure(f"case 20, {name}: imaginary part of displacements of points", dropped / moved, NOTHING)
+    figure("imaginary part of displacements of points", dropped / moved, NOTHING)
 
 
 class Dropped:
@@ -189,10 +189,10 @@ def test_20_inverse_transforms_are_real(name, sweep, tmp_path, monkeypatch, figu
     lapse = result.lapses[0]
     assert lapse.frequency[0] == 0 and np.abs(lapse.displacement).max() > 0
     share = dropped.share
-    figure(f"case 20, {name}, {sweep}: dropped", share[np.dtype(np.complex128)], NOTHING)
+    figure("imaginary part of inverse transforms", share[np.dtype(np.complex128)], NOTHING)
     # Peaks may be found in single precision: its round-off, over a basis of some fifty directions.
     limit = 50 * np.finfo(np.float32).eps
-    figure(f"case 20, {name}, {sweep}: dropped, peaks", share[np.dtype(np.complex64)], limit)
+    figure("imaginary part of peaks, in single precision", share[np.dtype(np.complex64)], limit)
 
 
 def test_20_a_reduced_viscous_sweep_drops_no_more_than_its_error(tmp_path, figure):
@@ -204,7 +204,7 @@ def test_20_a_reduced_viscous_sweep_drops_no_more_than_its_error(tmp_path, figur
         patch.setattr(f"{__name__}.GROUND", elastic)
         lapse = Lapse(shaken(tmp_path, "viscous"))
     found = reduced_sweep(lapse.system, lapse.loads, lapse.excitation.s, 1e-6)
-    figure("case 20, viscous, reduced: h(0)", imaginary_share(found.solution(0)), 1e-6)
+    figure("imaginary part of h(0), viscous, reduced", imaginary_share(found.solution(0)), 1e-6)
 
 
 @pytest.mark.parametrize("sweep", ["direct", "reduced"])
@@ -233,12 +233,11 @@ def test_16_an_acceleration_with_a_mean(dim, sweep, tmp_path, figure):
     lapse = result.lapses[0]
     assert list(lapse.frequency) == pytest.approx([0.0, 1 / (cycle * DT)])
     u, v = lapse.displacement[0, 0], lapse.velocity[0, 0]
-    name = f"case 16, {dim}D, {sweep}"
     cycled = u.reshape(cycles, cycle)
-    figure(f"{name}: drift over the peak", np.abs(cycled - cycled[0]).max() / abs(u).max(), 1e-6)
-    figure(f"{name}: mean velocity over the peak", abs(v.mean()) / abs(v).max(), 1e-6)
+    figure("steady: drift over the peak", np.abs(cycled - cycled[0]).max() / abs(u).max(), 1e-6)
+    figure("steady: mean velocity over the peak", abs(v.mean()) / abs(v).max(), 1e-6)
     # At rest, with the real modulus: u = −ρ a H²/2G, which linear cells hit at their nodes.
     held = -mean * height**2 / (2 * SOIL["shear_wave_velocity"] ** 2)
-    figure(f"{name}: mean displacement", abs(u.mean() / held - 1), 10 * tolerance)
+    figure("steady: mean displacement off −ρaH²/2G", abs(u.mean() / held - 1), 10 * tolerance)
     total = lapse.total_acceleration[0, 0].mean()
-    figure(f"{name}: mean total acceleration", abs(total / mean - 1), 1e-12)
+    figure("steady: mean total acceleration", abs(total / mean - 1), 1e-12)

@@ -129,19 +129,20 @@ def test_16_a_mean_from_lapse_to_lapse(dim, count, damped, tmp_path, figure):
         soil={"only": SOIL | {"damping": law.damping}},
     )
     result = simulate(case, MPI.COMM_SELF)
-    name = f"case 16, {dim}D, {damped}, {count} lapses"
     u, v = (result.history(motion)[0, 0] for motion in ("displacement", "velocity"))
     late = slice(22 * cycle, 28 * cycle)  # three lapses of two cycles, in which the start is past
     by_lapse = u[late].reshape(-1, 2 * cycle)
     drift = np.abs(by_lapse - by_lapse[0]).max() / np.abs(u).max()
-    figure(f"{name}: drift over the peak", drift, 1e-6)
-    figure(f"{name}: mean velocity over the peak", abs(v[late].mean()) / np.abs(v).max(), 1e-5)
+    figure("1 and 15 lapses: drift over the peak", drift, 1e-6)
+    figure(
+        "1 and 15 lapses: mean velocity over the peak", abs(v[late].mean()) / np.abs(v).max(), 1e-5
+    )
     # At rest the relaxed modulus holds the ground: u = −ρ a H²/2G_r, exact at nodes.
     softer = float(maxwell_factor(0.0, law.damping, REFERENCE_FREQUENCY).real)
     held = -mean * height**2 / (2 * SOIL["shear_wave_velocity"] ** 2 * softer)
-    figure(f"{name}: mean displacement", abs(u[late].mean() / held - 1), PEAK)
+    figure("1 and 15 lapses: mean displacement off −ρaH²/2G", abs(u[late].mean() / held - 1), PEAK)
     total = result.history("total_acceleration")[0, 0, late].mean()
-    figure(f"{name}: mean total acceleration", abs(total / mean - 1), PEAK)
+    figure("1 and 15 lapses: mean total acceleration", abs(total / mean - 1), PEAK)
 
 
 # ---------------------------------------------------------------- 17: a pulse at the end
@@ -173,8 +174,7 @@ def test_17_a_pulse_at_the_end_of_a_lapse(name, place, tmp_path, figure):
     }[place]
     record = pulse(begin, count * LENGTH)
     found = run_column(tmp_path, CAUSAL[name], record, lapses(count))
-    said = f"case 17, {name}, pulse {place}: energy before it"
-    figure(said, energy_before(found, record), 1e-6)
+    figure(f"{place}: energy before it", energy_before(found, record), 1e-6)
 
 
 def test_17_the_periodic_lapse_fails(tmp_path, figure):
@@ -182,8 +182,12 @@ def test_17_the_periodic_lapse_fails(tmp_path, figure):
     record = pulse(8.5, LENGTH)
     law = Law(0.05, tuple(HYSTERETIC.items()))
     found = run_column(tmp_path, law, record, lapses(1, "steady"))
-    said = "case 17, hysteretic 5 %, steady (naive): energy before the pulse"
-    figure(said, energy_before(found, record), 0.1, at_least=True)
+    figure(
+        "naive, a periodic lapse: energy before it",
+        energy_before(found, record),
+        0.1,
+        at_least=True,
+    )
 
 
 @pytest.mark.parametrize(("damping", "limit"), [(0.05, 2.5e-6), (0.1, 1.8e-5)])
@@ -192,7 +196,7 @@ def test_17_the_hysteretic_law_knows_what_comes(damping, limit, tmp_path, figure
     record = pulse(8.5, LENGTH)
     law = Law(damping, tuple(HYSTERETIC.items()))
     found = run_column(tmp_path, law, record, lapses(1))
-    said = f"case 17, hysteretic {100 * damping:g} %: energy before the pulse"
+    said = f"hysteretic, {100 * damping:g} %, the law's own: energy before it"
     figure(said, energy_before(found, record), limit)
 
 
@@ -223,11 +227,11 @@ def test_18_lapses_against_one(name, dim, count, run_body, figure):
     """Naively each lapse forgets the one before: 88 % off, or a law without a state: 3-40 %."""
     u, expected = run_body(dim, name, count), run_body(dim, name, 1)
     samples = u.shape[-1]
-    said = f"case 18, {dim}D, {name}, {count} lapses against one"
-    figure(f"{said}: displacement", error(u, expected), PEAK)
+    figure(f"{name}: 2 to 40 lapses against one", error(u, expected), PEAK)
     off = np.abs(u - expected).max(axis=(0, 1)) / np.abs(expected).max()
     early, late = off[: samples // 2].max(), off[-samples // 10 :].max()
-    figure(f"{said}: growth of the error", late, max(2 * early, 0.2 * PEAK))
+    # at the end not above twice what it was before, or a fifth of what is allowed
+    figure("growth of the error", late / max(early, 0.1 * PEAK), 2)
 
 
 def test_18_steady_lapses_fail(tmp_path, figure):
@@ -236,8 +240,7 @@ def test_18_steady_lapses_fail(tmp_path, figure):
     one = run_column(tmp_path, law, quiet_record(), lapses(1))
     steady = run_column(tmp_path, law, quiet_record(), lapses(5, "steady"))
     u, expected = (run.history("displacement")[:, 0] for run in (steady, one))
-    said = "case 18, viscous, 5 steady lapses (naive): displacement"
-    figure(said, error(u, expected), 0.3, at_least=True)
+    figure("naive, 5 steady lapses against one", error(u, expected), 0.3, at_least=True)
 
 
 @pytest.mark.parametrize("count", [2, 5, 10])
@@ -247,8 +250,7 @@ def test_18_hysteretic_lapses(damping, count, tmp_path, figure):
     law = Law(damping, tuple(HYSTERETIC.items()))
     one, many = (run_column(tmp_path, law, quiet_record(), lapses(n)) for n in (1, count))
     u, expected = (run.history("displacement")[:, 0] for run in (many, one))
-    said = f"case 18, hysteretic {100 * damping:g} %, {count} lapses against one: displacement"
-    figure(said, error(u, expected), 1e-3)
+    figure("hysteretic, scheme F: 2 to 10 lapses against one", error(u, expected), 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -259,7 +261,7 @@ def test_18_hysteretic_lapses(damping, count, tmp_path, figure):
         pytest.param(0.75, 12.0, id="both"),
     ],
 )
-def test_18_a_cut_that_would_explode_is_refused(duration, max_frequency, tmp_path):
+def test_18_a_cut_that_would_explode_is_refused(duration, max_frequency, tmp_path, figure):
     """Naively 100 % error at lapses of 1.5 s cut at 12 Hz, and an explosion at 0.75 s.
 
     The rule: the highest line is above twice the record's band, and a lapse holds ten of its
@@ -267,8 +269,11 @@ def test_18_a_cut_that_would_explode_is_refused(duration, max_frequency, tmp_pat
     """
     cut = {"duration": duration, "continuity": "transient"}
     law = CAUSAL["maxwell 5 %"]
-    with pytest.raises((SceneError, SimulationError), match="max_frequency"):
+    with pytest.raises((SceneError, SimulationError), match="max_frequency") as caught:
         run_column(tmp_path, law, quiet_record(), cut, max_frequency=max_frequency)
+    rules = ("twice the frequency", "frequency times length")
+    told = any(rule in str(caught.value) for rule in rules)
+    figure("cuts that would explode, refused without the rule", not told, 0)
 
 
 @pytest.mark.parametrize("duration", [0.75, 0.5])
@@ -281,13 +286,14 @@ def test_18_a_cut_within_the_rule_is_stable(sweep, duration, tmp_path, figure):
     soil = usual_column(law="maxwell", reference_frequency=REFERENCE_FREQUENCY)
     expected = soil.respond(quiet_record(), DT, usual_stages([1.0], law.damping)).displacement
     u = found.history("displacement")[:, 0, :SAMPLES]
-    said = f"case 18, lapses of {duration} s cut at 20 Hz, {sweep}: displacement"
-    figure(said, error(u, expected), PEAK)
+    figure("20 and 30 lapses where the rule is just met", error(u, expected), PEAK)
 
 
+THROUGH = "a cut through the second mode of 15 Hz"
 FINE = {  # cells, Vs [m/s], law, lapses, cut [Hz], degree: modes far above the highest line
     "cells of 0.5 m, Vs 200": (60, 200.0, MAXWELL, 20, 15.0, 1),
-    "cells of 0.5 m, Vs 600": (60, 600.0, MAXWELL, 20, 15.0, 1),
+    "cells of 0.5 m, Vs 600": (60, 600.0, MAXWELL, 20, 20.0, 1),
+    THROUGH: (60, 600.0, MAXWELL, 20, 15.0, 1),
     "degree 2, Vs 400": (15, 400.0, MAXWELL, 20, 15.0, 2),
     "viscous": (30, 250.0, {}, 10, 15.0, 1),
 }
@@ -319,10 +325,12 @@ def test_18_modes_that_no_line_can_follow(name, figure):
     many, one = run(count), run(1)
     found = many.history("displacement")[0, 0, :2000]
     # The cut passes through a mode of the stiff column: what it leaves out is felt at seams.
-    limit = 1e-3 if velocity == 600.0 else PEAK
-    figure(f"case 18, {name}: displacement", error(found, one.history("displacement")[0, 0]), limit)
+    limit = 1e-3 if name == THROUGH else PEAK
+    said = "modes above the cut" if limit == PEAK else "a cut through a mode"
+    off = error(found, one.history("displacement")[0, 0])
+    figure(f"{said}: 10 and 20 lapses against one", off, limit)
     worst = max(lapse.seam_error for lapse in many.lapses[1:])
-    figure(f"case 18, {name}: estimate of the seam error", worst, 1e-2)
+    figure("estimate of the seam error", worst, 1e-2)
 
 
 # ---------------------------------------------------------------- 27: what convection adds up
@@ -352,9 +360,9 @@ def test_27_steady_whole_periods_move_nothing(dim, tmp_path, figure):
     h = 12.0 / cells_high
     assert len(taken) == 5
     moved = max(float(np.abs(displacement).max()) for *_, displacement in taken)
-    figure(f"case 27, {dim}D, steady: net convection over h", moved / h, 1e-8)
+    figure("steady: net convection over h", moved / h, 1e-8)
     total = np.abs(result.history("displacement")[..., ::samples]).max()
-    figure(f"case 27, {dim}D, totals applied (naive): over h", total / h, 1e-5, at_least=True)
+    figure("naive, totals applied, steady: over h", total / h, 1e-5, at_least=True)
 
 
 @pytest.mark.parametrize("count", [4, 10])
@@ -383,9 +391,8 @@ def test_27_transient_points_follow_the_ground(count, tmp_path, figure):
         total += float(np.abs(nodes).max())
         at = np.interp(position[:, 1], heights, nodes)
         off = max(off, float(np.abs(displacement[:, 0] - at).max()))
-    said = f"case 27, transient, {count} lapses"
-    figure(f"{said}: points off the ground, over the peak", off / peak, 1e-3)
+    figure("transient: points off the ground over the peak", off / peak, 1e-3)
     rest = float(np.abs(taken[-1][2]).max())
-    figure(f"{said}: net convection over h", rest / cell, 1e-8)
+    figure("transient: net convection over h", rest / cell, 1e-8)
     if count == 10:
-        figure(f"{said}, totals applied (naive): over h", total / cell, 1e-7, at_least=True)
+        figure("naive, totals applied, transient: over h", total / cell, 1e-7, at_least=True)

@@ -100,7 +100,8 @@ def falls(G: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lapses", [1, 4, 32])
-def test_33_an_infinite_slope(lapses, tmp_path, figure):
+def test_33_an_infinite_slope_shears_by_its_softest(lapses, tmp_path, figure):
+    """γ = τ₀(1/G_min − 1/G₀) in 1 to 32 lapses; naively stress falls with every fall of G."""
     result = slope(tmp_path, lapses)
     G, order = moduli(result)
     small, least = G[0], G.min(axis=0)
@@ -117,10 +118,10 @@ def test_33_an_infinite_slope(lapses, tmp_path, figure):
     ):
         expected = at_edges(strain)
         off = np.abs(found - expected).max() / np.abs(expected).max()
-        figure(f"case 33, infinite slope, {lapses} lapses: {name}", off, ROUND_OFF)
+        figure(f"softening of an infinite slope: {name}", off, ROUND_OFF)
     if lapses == 32:
         ratchet = at_edges(bearing() * np.sin(ANGLE) * falls(G))[-1] / told.displacement[-1, 0]
-        figure("case 33, infinite slope, 32 lapses: falls only", ratchet, 1.1, at_least=True)
+        figure("naive, falls only, 32 lapses: times the shear", ratchet, 1.1, at_least=True)
 
 
 def test_33_earthquakes_that_bring_no_new_minimum(tmp_path, figure):
@@ -129,6 +130,7 @@ def test_33_earthquakes_that_bring_no_new_minimum(tmp_path, figure):
     G, _ = moduli(result)
     assert (G[5:].min(axis=0) >= G[:5].min(axis=0)).all()
     first, last = (result.lapses[n].softening.displacement for n in (3, 11))
-    assert np.array_equal(first, last) and np.abs(last).max() > 1e-3
+    assert np.abs(last).max() > 1e-3
+    figure("softening without a new minimum", np.abs(last - first).max(), 0, "m")
     ratchet = at_edges(bearing() * np.sin(ANGLE) * falls(G))[-1] / last[-1, 0]
-    figure("case 33, three earthquakes: falls only against one", ratchet, 2.0, at_least=True)
+    figure("naive, falls only, three earthquakes: against one", ratchet, 2.0, at_least=True)

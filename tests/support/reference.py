@@ -86,6 +86,7 @@ def column(
     duration: float,
     equivalent_linear: dict | None = None,
     convention: str = "dormieux",
+    sweep: str = "direct",
 ) -> Scene:
     """The scene that repeats a case with degree-2 cells, ``cell`` metres or ``cells`` a layer."""
     layers, soils = [], {}
@@ -119,7 +120,7 @@ def column(
             "boundary": {"left": "tied", "right": "tied"} | base,
             "lapses": {"duration": duration},
             "effects": effects,
-            "solver": {"complex_modulus": convention},
+            "solver": {"complex_modulus": convention, "sweep": sweep},
             "output": {"receivers": {"surface": [0.5, height]}},
         }
     )

@@ -1,5 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""A small scene with something of everything that lapses hand over."""
+"""A small scene with something of everything that lapses hand over; runs that stop and go on."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+from fenics_hytf.scene import Scene
+from fenics_hytf.simulation import CheckpointFolder, Result, simulate
 
 SCENE = """
 title = "A section"
@@ -34,3 +45,68 @@ sweep = "reduced"
 [output]
 receivers = { top = [4.0, 6.0], rider = { point = [3.0, 5.0] } }
 """
+
+
+class Stop(Exception):
+    """What stops a run."""
+
+
+def scene_with(folder: Path, **settings: str) -> Scene:
+    """The scene with other settings, ``solver__sweep='"direct"'``."""
+    file = folder / f"s{MPI.COMM_WORLD.rank}.toml"
+    file.write_text(SCENE)
+    return Scene.load(file, [f"{key.replace('__', '.')}={v}" for key, v in settings.items()])
+
+
+def run(scene: Scene, comm: MPI.Comm, folder: Path, resume=False, stop=None, size=None) -> Result:
+    """Run with checkpoints; as if something had gone wrong after lapse ``stop`` was shown."""
+
+    def snapshot(shown):
+        if shown.index == stop:
+            raise Stop
+
+    checkpoint = CheckpointFolder(folder, scene, comm, resume)
+    return simulate(scene, comm, None, snapshot, group_size=size, checkpoint=checkpoint)
+
+
+def arrays(result: Result) -> dict[str, np.ndarray]:
+    """All arrays of all lapses, joined by name."""
+    found: dict[str, list] = {}
+
+    def collect(name, record):
+        for field in dataclasses.fields(record):
+            value = getattr(record, field.name)
+            if dataclasses.is_dataclass(value):
+                collect(f"{name}.{field.name}", value)
+            elif value is not None and field.name not in ("change", "worst_cell", "last"):
+                found.setdefault(f"{name}.{field.name}", []).append(np.asarray(value).ravel())
+
+    for lapse in result.lapses:
+        collect("lapse", lapse)
+    return {name: np.concatenate(parts) for name, parts in found.items()}
+
+
+def apart(expected: dict[str, np.ndarray], found: dict[str, np.ndarray]) -> float:
+    """Largest difference over the largest value of its quantity; of energies over that of all."""
+    energy = max(np.abs(v).max(initial=0.0) for n, v in expected.items() if ".energy." in n)
+    worst = 0.0
+    for name, values in expected.items():
+        if name == "lapse.worst_residual":  # what a sweep left, not what it found
+            continue
+        # some energies are differences of others, and nought
+        largest = energy if ".energy." in name else np.abs(values).max(initial=0.0)
+        off = np.abs(found[name] - values).max(initial=0.0)
+        worst = max(worst, float(off / largest) if off else 0.0)
+    return worst
+
+
+def different(expected: dict[str, np.ndarray], found: dict[str, np.ndarray]) -> int:
+    """Arrays that differ in any bit, or that only one has."""
+    alike = [n for n in expected if n in found and expected[n].tobytes() == found[n].tobytes()]
+    return len(expected.keys() | found.keys()) - len(alike)
+
+
+def counts(result: Result) -> dict:
+    """Work done, but for the time it took."""
+    work = dataclasses.asdict(result.work)
+    return {name: value for name, value in work.items() if name != "wall_s"}

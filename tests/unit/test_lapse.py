@@ -8,6 +8,7 @@ import pytest
 from mpi4py import MPI
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
+from support.loop import GMAX, RISING, SOFTENING, STRAIN, ground, misfit, run
 from support.meshes import SOIL, scene
 
 from fenics_hytf.domain import build, constraint_matrix
@@ -17,16 +18,13 @@ from fenics_hytf.lapse import (
     CellProbe,
     ElasticConstants,
     EmptyCellError,
-    EquivalentLinearError,
     Excitation,
-    Ground,
     Material,
     Part,
     Response,
     Spectra,
     excite,
     first_strain,
-    iterate,
     peak_length,
     peak_shear_strain,
     survey,
@@ -34,7 +32,7 @@ from fenics_hytf.lapse import (
 from fenics_hytf.motion import to_time
 from fenics_hytf.particles import quadrature_rule, seed
 from fenics_hytf.particles.points import take
-from fenics_hytf.scene import EquivalentLinear, Scene
+from fenics_hytf.scene import Scene
 from fenics_hytf.soil import Curve
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
@@ -86,51 +84,6 @@ def test_points_that_repeat_do_no_harm():
 
 # ---------------------------------------------------------------- the equivalent-linear loop
 
-STRAIN = np.array([1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
-SOFTENING = np.array([1.0, 0.97, 0.75, 0.3, 0.06])
-RISING = np.array([0.01, 0.015, 0.05, 0.14, 0.24])
-GMAX = 50e6
-
-
-def ground(*curves, cells=(0,)) -> Ground:
-    """Cells of soils with given curves."""
-    region = np.array(cells, np.int32)
-    full = np.ones(len(region))
-    return Ground(region, 2000.0 * full, GMAX * full, 0.3 * full, 0.02 * full, curves)
-
-
-def settings(**changes) -> EquivalentLinear:
-    return EquivalentLinear(**{"tolerance": 1e-4, "strain_ratio": 0.65, **changes})
-
-
-def run(soil, peak, start, strain_from=None, **changes):
-    """The loop's results, the moduli of each of its solves, and what it reported."""
-    solved, reported = [], []
-
-    def peak_strain(moduli, iteration):
-        solved.append(moduli)
-        assert iteration == len(solved)
-        return peak(moduli)
-
-    moduli, effective, history = iterate(
-        soil,
-        settings(**changes),
-        np.broadcast_to(start, soil.region.shape).astype(float),
-        peak_strain,
-        lambda iteration, change: reported.append((iteration, change)),
-        strain_from,
-    )
-    assert reported == [(i + 1, c) for i, c in enumerate(history.change)]
-    assert moduli is solved[-1]
-    return moduli, effective, history
-
-
-def consistent(soil, moduli, effective, tolerance=1e-4):
-    """The moduli are those of the strain that they caused."""
-    G, D = soil.secant(effective).shear_modulus, soil.secant(effective).damping
-    np.testing.assert_allclose(moduli.shear_modulus, G, rtol=tolerance)
-    np.testing.assert_allclose(moduli.damping, D, rtol=tolerance)
-
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
 @pytest.mark.parametrize("load", [1e-5, 5e-5, 1e-4])
@@ -146,7 +99,7 @@ def test_the_loop_finds_the_fixed_point(load, power):
     moduli, effective, history = run(
         soil, lambda m: load * (GMAX / m.shear_modulus) ** power, 1e-5, tolerance=1e-6
     )
-    consistent(soil, moduli, effective, 1e-6)
+    assert misfit(soil, moduli, effective) <= 1e-6
     # A change of 1e-6 in G or D is one of some 1e-5 in strain at the flat end of the curves.
     assert np.log(effective[0]) == pytest.approx(fixed, abs=2e-5)
     assert history.change[-1] <= 1e-6 < history.change[-2]
@@ -157,17 +110,7 @@ def test_damping_counts_where_the_modulus_is_flat():
     soil = ground(curve)
     moduli, effective, history = run(soil, lambda m: 5e-5 / m.damping, 1e-2)
     assert len(history.change) > 2
-    consistent(soil, moduli, effective)
-
-
-def test_a_flat_damping_branch_does_not_fake_convergence():
-    # D never changes; a test on D alone, or on the signed change, would stop at once.
-    curve = Curve(STRAIN, SOFTENING, np.full(5, 0.05))
-    soil = ground(curve)
-    for start in (1e-6, 1e-2):  # from either side: the change has either sign
-        moduli, effective, history = run(soil, lambda m: 2e-4 * GMAX / m.shear_modulus, start)
-        assert len(history.change) > 2
-        consistent(soil, moduli, effective)
+    assert misfit(soil, moduli, effective) <= 1e-4
 
 
 def test_a_linear_soil_takes_one_solve():
@@ -183,44 +126,6 @@ def test_a_still_ground_is_no_error():
     moduli, effective, _ = run(soil, lambda m: np.zeros(1), 0.0)
     assert effective.tolist() == [0.0]
     assert moduli.shear_modulus.tolist() == [GMAX]
-
-
-def test_a_two_cycle_ends_in_an_error_with_its_cell():
-    """Strain falls when the modulus falls, with a jump: no moduli fit, in cell 3 alone."""
-    soil = ground(Curve(STRAIN, SOFTENING, RISING), None, cells=(0, 1, 0, 0, 1))
-
-    def peak(moduli):
-        strain = 1e-4 * GMAX / moduli.shear_modulus
-        strain[3] = 1e-5 if moduli.shear_modulus[3] < 0.6 * GMAX else 1e-3
-        return strain
-
-    for limit in (1, 2, 7, 40):
-        with pytest.raises(EquivalentLinearError) as caught:
-            run(soil, peak, 1e-4, max_iterations=limit)
-        assert caught.value.worst_cell == (3 if limit > 1 else caught.value.worst_cell)
-        assert caught.value.change > 0.1
-        assert f"iteration {limit}: found cell" in str(caught.value)
-    assert "cell 3 still changing" in str(caught.value)
-
-
-def test_a_smooth_two_cycle_converges():
-    # The map's slope in ln γ is -1.2 at the fixed point: plain iteration would leave it.
-    curve = Curve(STRAIN, SOFTENING, RISING)
-    soil = ground(curve)
-
-    def image(x):
-        return np.log(3e-4 * (curve.evaluate(np.exp(x))[0] / 0.6) ** 4)
-
-    fixed = brentq(lambda x: image(x) - x, -12, -4)
-    assert (image(fixed + 1e-3) - image(fixed - 1e-3)) / 2e-3 < -1.1
-    moduli, effective, _ = run(
-        soil,
-        lambda m: 3e-4 / 0.65 * (m.shear_modulus / (0.6 * GMAX)) ** 4,
-        np.exp(fixed + 0.02),
-        tolerance=1e-6,
-    )
-    consistent(soil, moduli, effective, 1e-6)
-    assert np.log(effective[0]) == pytest.approx(fixed, abs=2e-5)
 
 
 def test_cells_can_share_the_strain_of_another():

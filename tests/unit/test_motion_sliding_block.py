@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: MIT
 """Marches of a slip: Newmark's block, a system of two masses marched in time, pyslammer."""
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from time import perf_counter
 from types import ModuleType
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from scipy.optimize import brentq
-from scipy.signal import fftconvolve
+from support.two_masses import LIMIT, STEP, TwoMasses, burst, linear_driving
 
 from fenics_hytf.motion import (
     GRAVITY,
-    ConvolutionQuadrature,
     SlipError,
     SlipHistory,
     decoupled_slip,
@@ -26,7 +22,6 @@ from fenics_hytf.motion import (
 )
 
 G = 9.81
-STEP = 0.005  # [s]
 
 
 # ---------------------------------------------------------------- Newmark's block
@@ -148,95 +143,6 @@ def test_it_stops_at_the_most_slip():
 # ---------------------------------------------------------------- two masses above a seam
 
 
-@dataclass(frozen=True)
-class TwoMasses:
-    """A spring that yields one way below two masses, damped by the mass and in the upper spring.
-
-    Attributes:
-        mass_damping: α of C = αM [1/s].
-    """
-
-    mass_damping: float
-    mass = np.array([1.5, 1.0])
-    seam = 300.0
-    spring = 120.0
-    spring_damping = 0.4
-    phi = np.ones(2)
-
-    @property
-    def M(self) -> np.ndarray:
-        return np.diag(self.mass)
-
-    @property
-    def C(self) -> np.ndarray:
-        return self.mass_damping * self.M + self.spring_damping * np.array([[1, -1], [-1, 1.0]])
-
-    @property
-    def K(self) -> np.ndarray:
-        spring = self.spring * np.array([[1, -1], [-1, 1.0]])
-        return spring + np.diag([self.seam, 0.0])
-
-    def kernel(self, s: np.ndarray, damped: bool = True) -> np.ndarray:
-        """P = (φᵀb − bᵀA⁻¹b)/s² with b = (s²M + sC)φ, or with s²Mφ alone."""
-        z = s[:, None, None]
-        A = z**2 * self.M + z * self.C + self.K
-        b = (z**2 * self.M + (z * self.C if damped else 0.0)) @ self.phi
-        w = np.linalg.solve(A, b[..., None])[..., 0]
-        return (b @ self.phi - np.sum(b * w, axis=1)) / s**2
-
-    def weights(self, num: int, dt: float, damped: bool = True) -> np.ndarray:
-        quadrature = ConvolutionQuadrature(num, dt)
-        return quadrature.weights(self.kernel(quadrature.s, damped))
-
-    def linear(self, force: np.ndarray, dt: float, start: np.ndarray) -> np.ndarray:
-        """w and ẇ, shape (4, n), exact for a force (2, n) that is linear from step to step."""
-        inverse = np.linalg.inv(self.M)
-        rates = np.zeros((8, 8))
-        rates[:2, 2:4] = rates[4:6, 6:8] = np.eye(2)
-        rates[2:4, :4] = -inverse @ np.hstack([self.K, self.C])
-        rates[2:4, 4:6] = inverse
-        step = expm(rates * dt)
-        state = np.empty((4, force.shape[1]))
-        state[:, 0] = start
-        for n in range(force.shape[1] - 1):
-            slope = (force[:, n + 1] - force[:, n]) / dt
-            state[:, n + 1] = step[:4] @ np.concatenate([state[:, n], force[:, n], slope])
-        return state
-
-    def elastoplastic(self, drive: np.ndarray, dt: float, limit: float) -> float:
-        """Slip by the average acceleration method, with return mapping of the seam's force."""
-        above = self.K - np.diag([self.seam, 0.0])
-        effective = above + 2 / dt * self.C + 4 / dt**2 * self.M
-        slipping = np.linalg.inv(effective)
-        sticking = np.linalg.inv(effective + np.diag([self.seam, 0.0]))
-        u, v, a, slip = np.zeros(2), np.zeros(2), drive[0] * self.phi, 0.0
-        for load in np.outer(drive[1:], self.mass):
-            right = load + self.M @ (4 / dt * v + a) + self.C @ v - above @ u
-            step = sticking @ (right - [self.seam * (u[0] - slip), 0.0])
-            if self.seam * (u[0] + step[0] - slip) > limit:
-                step = slipping @ (right - [limit, 0.0])
-                slip = u[0] + step[0] - limit / self.seam
-            u, a = u + step, 4 / dt**2 * step - 4 / dt * v - a
-            v = 2 / dt * step - v
-        return slip
-
-
-LIMIT = 4.0  # [N], of the seam; the linear response drives it with four times as much
-
-
-def burst(dt: float, duration: float = 6.0) -> np.ndarray:
-    """Waves of 0.9 and 2.3 Hz that swell and fade every six seconds."""
-    time = dt * np.arange(round(duration / dt) + 1)
-    waves = np.sin(2 * np.pi * 0.9 * time) + 0.6 * np.sin(2 * np.pi * 2.3 * time + 1.0)
-    return 4.0 * waves * np.sin(np.pi * time / 6.0) ** 2
-
-
-def linear_driving(system: TwoMasses, drive: np.ndarray, dt: float) -> np.ndarray:
-    """Q_lin, which is the force of the seam."""
-    load = np.outer(system.mass, drive)
-    return system.seam * system.linear(load, dt, np.zeros(4))[0]
-
-
 @cache
 def exact_slip(mass_damping: float) -> float:
     fine = STEP / 16
@@ -267,26 +173,6 @@ def test_damping_of_the_mechanism_itself(mass_damping, figure):
         figure("two masses: error without the terms Cφ", abs(other / exact - 1), 0.2, at_least=True)
     else:
         assert other == pytest.approx(slip, rel=1e-9)
-
-
-def test_a_march_of_20000_steps(figure):
-    """Its slip is that of the system marched in time, at the end of 100 s as in between."""
-    system, num = TwoMasses(0.0), 20_000
-    drive = np.where(np.arange(num) < 0.7 * num, burst(STEP, 101.0)[:num], 0.0)
-    driving = linear_driving(system, drive, STEP)
-    weights = system.weights(num, STEP)
-    march(driving[:10], LIMIT, weights, STEP)  # compiled
-    start = perf_counter()
-    history = march(driving, LIMIT, weights, STEP)
-    figure("20 000 steps", perf_counter() - start, 5.0, "s")
-    exact = system.elastoplastic(straight_lines(drive, 2), STEP / 2, LIMIT)
-    assert exact > 10.0
-    figure("20 000 steps: error of slip", abs(history.slip[-1] / exact - 1), 5e-3)
-    assert np.ptp(history.slip[int(0.8 * num) :]) == 0.0  # at rest
-    force = driving - fftconvolve(weights, history.acceleration)[:num]
-    figure("20 000 steps: largest force over Q_y, above 1", force.max() / LIMIT - 1, 1e-9)
-    fading = np.abs(force[int(0.75 * num) :].reshape(10, -1)).max(axis=1)
-    assert (np.diff(fading) < 0).all()  # what is left is free vibration
 
 
 def handed_over(system: TwoMasses, drive: np.ndarray, count: int) -> float:
