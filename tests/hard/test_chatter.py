@@ -21,15 +21,14 @@ CURVE = Curve(STRAIN, SOFTENING, RISING)
 
 
 @pytest.mark.parametrize("pga", [0.5, 1.0])
-@pytest.mark.parametrize("sweep", ["direct", "reduced"])
 @pytest.mark.parametrize("record", ["synthetic", "NIS090"])
-def test_29_strongly_shaken_columns_converge(record, sweep, pga, figure):
+def test_29_strongly_shaken_columns_converge(record, pga, figure):
     """The reference's columns of 24 m, at 0.5 and 1 g: strains of 1 % and more."""
     case = load(f"c_darendeli24_{record}_pga0p5")
     period = case["motion"]["fa_length"] * case["motion"]["dt_s"]
     loop = {"tolerance": TOLERANCE, "max_iterations": 40}
     shaking = motion(case) | {"pga": pga}
-    scene = column(case, shaking, cells=1, duration=period, equivalent_linear=loop, sweep=sweep)
+    scene = column(case, shaking, cells=1, duration=period, equivalent_linear=loop, sweep="reduced")
     history = simulate(scene).lapses[0].loop
     figure(f"columns at {pga:g} g: iterations", len(history.change), ITERATIONS)
     figure(f"columns at {pga:g} g: largest change left", history.change[-1], TOLERANCE)
