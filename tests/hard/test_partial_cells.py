@@ -159,10 +159,10 @@ def test_10_cells_cut_to_next_to_nothing(figure):
 # ---------------------------------------------------------------- 11
 
 
-def test_11_units_of_length(figure):
+@pytest.mark.parametrize(("dim", "side", "lines"), [(2, 3, 30), (3, 2, 6)])
+def test_11_units_of_length(dim, side, lines, figure):
     """In m, mm and km; E/30·h³/3 of the literature would hold by a square of the unit too much."""
-    side = 3
-    band = 2 * np.pi * np.linspace(0.1, 6.0, 30)
+    band = 2 * np.pi * np.linspace(0.1, 6.0, lines)
 
     def measured(unit: float, naive: bool = False) -> tuple[np.ndarray, float]:
         """Transfer functions u_x ω² of all nodes at all frequencies, and the condition of K."""
@@ -170,9 +170,9 @@ def test_11_units_of_length(figure):
             "density": SOFT["density"] / unit**3,
             "shear_modulus": SOFT["shear_modulus"] / unit,
         }
-        case, inside = section(side, side, size=unit, soil=soil), in_block(side, side, unit)
+        case, inside = section(side, side, dim, unit, soil), in_block(side, side, unit)
         options = {"kind": HeldEverywhere, "strength": unit**2 / 30} if naive else {}
-        ground = Ground(case, inside, translated(0.3 * unit), **options)
+        ground = Ground(case, inside, translated(0.3 * unit, dim), **options)
         assert ground.filling.loose.any()
         transfer = np.array([w**2 * ground.nodal(w)[:, 0] for w in band])
         x = ground.domain.V.tabulate_dof_coordinates() / unit
