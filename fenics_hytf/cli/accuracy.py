@@ -11,11 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-import typer
 from mpi4py import MPI
 
 from fenics_hytf.cli.collective import at_root, load_scene
-from fenics_hytf.cli.outcome import DONE, STOPPED, InputError, RunRequest, tell
+from fenics_hytf.cli.outcome import DONE, STOPPED, InputError, RunRequest, say, tell
 from fenics_hytf.cli.progress import duration
 from fenics_hytf.results import folder_faults, open_result
 from fenics_hytf.scene import Scene
@@ -65,7 +64,7 @@ def study_accuracy(request: RunRequest, comm: MPI.Comm, budget: float | None = N
     finally:
         folder.close()
     if not request.quiet:
-        typer.echo(closing_words(study, request.folder))
+        say(closing_words(study, request.folder))
     return DONE
 
 
@@ -157,7 +156,7 @@ def closing_words(study: Study, folder: Path) -> str:
 def _show(quiet: bool, stream: TextIO | None = None) -> Iterator[StudyCallback | None]:
     """What to hand to :func:`conduct`: a bar on a terminal, plain lines elsewhere."""
     target = sys.stderr if stream is None else stream
-    if quiet:
+    if quiet or target is None:  # closed before the program began
         yield None
     elif target.isatty():
         with _bar(target) as callback:
@@ -167,8 +166,7 @@ def _show(quiet: bool, stream: TextIO | None = None) -> Iterator[StudyCallback |
 
         def line(progress: StudyProgress) -> None:
             words = ", ".join(filter(None, (progress.text, left(progress))))
-            target.write(f"{_place(progress)}: {words}\n")
-            target.flush()
+            say(f"{_place(progress)}: {words}", target)
 
         yield line
 

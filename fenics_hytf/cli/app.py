@@ -20,7 +20,9 @@ from fenics_hytf.cli.outcome import (
     InputError,
     RunRequest,
     launched_rank,
+    say,
     tell,
+    tolerant_streams,
 )
 
 app = typer.Typer(
@@ -80,6 +82,7 @@ def main(arguments: list[str] | None = None) -> NoReturn:
     Args:
         arguments: What follows ``hytf``; the process's own if ``None``.
     """
+    tolerant_streams()
     given = sys.argv[1:] if arguments is None else arguments
     given = fill_plot(spread_overrides(given))
     if launched_rank() == 0:
@@ -130,7 +133,7 @@ def _hytf(
     if version:
         from fenics_hytf.results.summary import own_version
 
-        typer.echo(f"hytf {own_version()}")
+        say(f"hytf {own_version()}")
         raise typer.Exit
 
 
@@ -227,7 +230,7 @@ def demo(
     from fenics_hytf.cli.demos import find_demo, list_demos
 
     if name is None:
-        typer.echo(list_demos())
+        say(list_demos())
         return
     try:
         source = find_demo(name)

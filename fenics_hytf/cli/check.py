@@ -6,11 +6,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import typer
 from mpi4py import MPI
 
 from fenics_hytf.cli.collective import at_root, load_scene
-from fenics_hytf.cli.outcome import DONE, InputError, RunRequest, tell
+from fenics_hytf.cli.outcome import DONE, InputError, RunRequest, say, tell
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import Inspection, factor_of_safety, inspect
 
@@ -42,11 +41,11 @@ def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -
         tell(["looking for the factor of safety at rest: some tens of factorisations"])
         safety = factor_of_safety(scene, comm)
     if comm.rank == 0:
-        typer.echo(describe(inspection, safety))
+        say(describe(inspection, safety))
     if plot is not None:
         drawn = at_root(comm, lambda: draw(scene, plot))
         if drawn is not None:
-            typer.echo(f"  {'curves':15s} {drawn}")
+            say(f"  {'curves':15s} {drawn}")
     return DONE
 
 

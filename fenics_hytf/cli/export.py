@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import typer
 
-from fenics_hytf.cli.outcome import DONE, INPUT, InputError, tell
+from fenics_hytf.cli.outcome import DONE, INPUT, InputError, say, tell
 from fenics_hytf.motion import Record, write_at2, write_columns, write_csv
 from fenics_hytf.results import ResultError, folder_faults, read_summary, read_tables
 from fenics_hytf.results.summary import moving_components
@@ -96,7 +95,7 @@ def export_motions(request: ExportRequest) -> int:
     except InputError as error:
         tell(error.faults)
         return INPUT
-    typer.echo(f"{folder}: {', '.join(files)}")
+    say(f"{folder}: {', '.join(files)}")
     return DONE
 
 

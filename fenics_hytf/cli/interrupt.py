@@ -22,9 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
-import typer
-
-from fenics_hytf.cli.outcome import INTERRUPTED, tell
+from fenics_hytf.cli.outcome import INTERRUPTED, say, tell
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -77,8 +75,7 @@ def interruptible(
         with suppress(Exception):  # whatever fails here, all ranks have to end
             release()
         with suppress(Exception):
-            typer.echo(f"hytf: {farewell()}", err=True)
-            sys.stderr.flush()
+            say(f"hytf: {farewell()}", sys.stderr)
         comm.Abort(INTERRUPTED)
 
     # a process in the background may have been told to ignore Ctrl-C

@@ -17,10 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-import typer
-
 import fenics_hytf
-from fenics_hytf.cli.outcome import DONE, INPUT, STOPPED, InputError, tell
+from fenics_hytf.cli.outcome import DONE, INPUT, STOPPED, InputError, say, tell
 
 _HELP = ("-h", "--help")
 
@@ -49,11 +47,11 @@ def make_mesh(arguments: Sequence[str]) -> int:
         The exit code.
     """
     if not arguments or arguments[0] in _HELP:
-        typer.echo(list_kinds())
-        typer.echo("\nhytf mesh KIND --help tells the options of a kind.")
+        say(list_kinds())
+        say("\nhytf mesh KIND --help tells the options of a kind.")
         return DONE
     try:
-        typer.echo(_draw(arguments[0], arguments[1:]))
+        say(_draw(arguments[0], arguments[1:]))
     except InputError as error:
         tell(error.faults)
         return INPUT

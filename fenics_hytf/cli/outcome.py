@@ -3,10 +3,14 @@
 
 from __future__ import annotations
 
+import io
 import os
+import sys
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import typer
 
@@ -75,4 +79,36 @@ def tell(messages: Iterable[str]) -> None:
     """Write messages to standard error, on the first of several ranks."""
     if launched_rank() == 0:
         for message in messages:
-            typer.echo(f"hytf: {message}", err=True)
+            say(f"hytf: {message}", sys.stderr)
+
+
+def say(text: str, stream: TextIO | None = None) -> None:
+    """Write a text and a line's end, to standard output unless told otherwise.
+
+    What a command does is done whether or not anybody listens: a reader that has gone (``| head``)
+    is no fault, and a stream that cannot be written otherwise is told on standard error.
+    """
+    stream = sys.stdout if stream is None else stream
+    if stream is None:  # closed before the program began
+        return
+    try:
+        typer.echo(text, file=stream)
+    except OSError as error:
+        _leave_unread(stream)
+        if stream is sys.stdout and not isinstance(error, BrokenPipeError):
+            say(f"hytf: standard output cannot be written ({error.strerror})", sys.stderr)
+
+
+def tolerant_streams() -> None:
+    """Let no text fail for a character that the terminal's encoding does not have."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _leave_unread(stream: TextIO) -> None:
+    """Send what is still to come, at the interpreter's end at the latest, to nowhere."""
+    with suppress(OSError, ValueError):
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, stream.fileno())
+        os.close(nowhere)

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import typer
-
-from fenics_hytf.cli.outcome import DONE, INPUT, tell
+from fenics_hytf.cli.outcome import DONE, INPUT, say, tell
 from fenics_hytf.results import ResultError, locked, publish
 
 
@@ -29,5 +27,5 @@ def plot_result(folder: Path) -> int:
     except OSError as error:
         tell([f"{folder}: found that it cannot be written ({error}); expected write permission"])
         return INPUT
-    typer.echo(f"{folder}: {', '.join(written)}")
+    say(f"{folder}: {', '.join(written)}")
     return DONE

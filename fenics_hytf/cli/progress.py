@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from fenics_hytf.cli.outcome import say
+
 if TYPE_CHECKING:
     from fenics_hytf.simulation import Progress, ProgressCallback
 
@@ -107,8 +109,7 @@ class PlainLines:
             self._last = now
             left = "" if ends else duration(self._estimate.seconds_left)
             text = ", ".join(part for part in (describe(progress), left) if part)
-            self._stream.write(f"{text}\n")
-            self._stream.flush()
+            say(text, self._stream)
 
 
 @contextmanager
@@ -123,7 +124,7 @@ def show_progress(quiet: bool, stream: TextIO | None = None) -> Iterator[Progres
         The callback, or ``None``.
     """
     stream = sys.stderr if stream is None else stream
-    if quiet:
+    if quiet or stream is None:  # closed before the program began
         yield None
     elif stream.isatty():
         with _bar(stream) as callback:

@@ -8,7 +8,6 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-import typer
 from mpi4py import MPI
 
 from fenics_hytf.cli.closing import closing_words
@@ -24,6 +23,7 @@ from fenics_hytf.cli.outcome import (
     InputError,
     RunRequest,
     WriteError,
+    say,
     tell,
 )
 from fenics_hytf.cli.progress import show_progress
@@ -49,6 +49,12 @@ from fenics_hytf.simulation import (
 )
 
 Command = Callable[[RunRequest, MPI.Comm], int]
+
+_GO_ON = "A run goes on after its last checkpoint with the same command and --resume"
+_LESS = (
+    "Take a coarser mesh, fewer lines (solver.max_frequency), sweep = \"reduced\", or more ranks on "
+    f"other computers. {_GO_ON}"
+)
 
 
 def guarded(command: Command, request: RunRequest, comm: MPI.Comm = MPI.COMM_WORLD) -> int:
@@ -78,13 +84,18 @@ def guarded(command: Command, request: RunRequest, comm: MPI.Comm = MPI.COMM_WOR
         _tell_once(comm, [f"stopped: {error}"])
         return STOPPED
     except WriteError as error:
-        _tell_once(comm, [f"stopped: results cannot be written ({error})"])
+        advice = f"Make room, or see to its permissions. {_GO_ON}"
+        _tell_once(comm, [f"stopped: results cannot be written ({error}). {advice}"])
         return STOPPED
     except KeyboardInterrupt as error:
         _tell_once(comm, [str(error) or "interrupted"])
         return _leave_alone(comm, INTERRUPTED)
+    except MemoryError as error:  # on this rank alone
+        say(f"hytf: stopped: {_who(comm)} ran out of memory ({error}). {_LESS}", sys.stderr)
+        return _leave_alone(comm, STOPPED)
     except Exception:
         traceback.print_exc()
+        say(f"hytf: {_who(comm)} met an error of the program, told above. {_GO_ON}", sys.stderr)
         return _leave_alone(comm, BUG)
 
 
@@ -117,7 +128,7 @@ def run_scene(request: RunRequest, comm: MPI.Comm) -> int:
     finally:
         _close(folder)
     if summary is not None and not request.quiet:
-        typer.echo(closing_words(summary, request.folder, request.plots))
+        say(closing_words(summary, request.folder, request.plots))
     return DONE
 
 
@@ -183,6 +194,8 @@ def _checkpoint(
         _say(request, comm, [f"going on after {_lapse(checkpoint, scene)}", *checkpoint.notes])
     elif request.resume:
         _say(request, comm, [f"{path}: found no checkpoint; starting at the first lapse"])
+    if comm.size > 1:  # mpirun says which rank was lost, and passes on nothing that others say then
+        _say(request, comm, [f"should a rank be lost: {path} is kept. {_GO_ON}"])
     return checkpoint
 
 
@@ -248,9 +261,14 @@ def _tell_once(comm: MPI.Comm, messages: list[str]) -> None:
         tell(messages)
 
 
+def _who(comm: MPI.Comm) -> str:
+    return f"rank {comm.rank} of {comm.size}" if comm.size > 1 else "the run"
+
+
 def _leave_alone(comm: MPI.Comm, code: int) -> int:
     """Leave although other ranks may be waiting for this one: they are ended."""
     if comm.size > 1:
-        sys.stderr.flush()
+        if sys.stderr is not None:
+            sys.stderr.flush()
         comm.Abort(code)
     return code

@@ -15,7 +15,6 @@ import errno
 import fcntl
 import json
 import os
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -23,6 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
+from fenics_hytf.results.files import replace_file
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.results.summary import summarise
 from fenics_hytf.results.writers import write_tables
@@ -248,7 +248,8 @@ class ResultFolder:
         Args:
             result: The simulation.
             finish: Called with the folder and the summary before ``summary.json`` is put in
-                place; draws figures. The result is finished even if it raises.
+                place; draws figures. Where it cannot write them the result is not finished, and
+                can be gone on with; it is in spite of any other exception.
 
         Returns:
             The summary as written.
@@ -291,13 +292,19 @@ class ResultFolder:
             summary["wall_s"]["output"] = summary["work"]["wall_s"]["output"] = seconds
 
         clock()
+        trouble: Exception | None = None
         try:
             if finish is not None:
                 finish(self.path, summary)
-        finally:
-            clock()
-            text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
-            replace_file(self.path / name, text + "\n")
+        except OSError:
+            raise
+        except Exception as error:  # a picture that cannot be drawn takes no result away
+            trouble = error
+        clock()
+        text = json.dumps(summary, indent=1, allow_nan=False, ensure_ascii=False)
+        replace_file(self.path / name, text + "\n")
+        if trouble is not None:
+            raise trouble
         return summary
 
     def _remove(self, patterns: Iterable[str]) -> None:
@@ -305,28 +312,6 @@ class ResultFolder:
             for file in self.path.glob(pattern):
                 file.unlink()
         _remove_empty([self.checkpoint])
-
-
-def replace_file(path: Path, text: str) -> None:
-    """Write a file and put it in place by one rename, so that no reader sees half of it.
-
-    Args:
-        path: The file.
-        text: What it holds afterwards.
-    """
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)  # as open() would have made it; mkstemp keeps it private
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
 
 
 def _take_lock(folder: Path) -> IO[str]:

@@ -20,6 +20,8 @@ import meshio
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf.results.files import replacing
+
 if TYPE_CHECKING:
     from fenics_hytf.simulation import Snapshot
 
@@ -83,13 +85,8 @@ def _by_component(points: Mapping[str, npt.NDArray[np.generic]]) -> Arrays:
 
 
 def _write(path: Path, mesh: meshio.Mesh) -> None:
-    """Write beside the place and rename: a reader sees a whole file or none."""
-    temporary = path.with_name(f".{path.name}")
-    try:
-        mesh.write(temporary, file_format="vtu")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with replacing(path) as part:
+        mesh.write(part, file_format="vtu")
 
 
 def _three(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import default_periods, response_spectrum
+from fenics_hytf.results.files import replacing
 from fenics_hytf.results.overburden import vertical_stress
 from fenics_hytf.results.sliding import slip_columns
 
@@ -64,7 +65,7 @@ Rows = Iterator[list[Any]]
 
 
 def _write_table(path: Path, header: list[str], rows: Rows) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replacing(path) as part, part.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(header)
         writer.writerows(rows)

@@ -13,6 +13,7 @@ from PIL import Image
 
 from fenics_hytf.results.figures.plane import Plane, discs, draw_mesh, picture_size
 from fenics_hytf.results.figures.style import length_unit, spread
+from fenics_hytf.results.files import replacing
 from fenics_hytf.results.ground import StoredPoints, read_points, snapshot_lapses
 from fenics_hytf.results.reader import StoredResult
 
@@ -83,9 +84,15 @@ def _write(frames: list[StoredPoints], plane: Plane, path: Path) -> None:
         images.append(_image(figure))
     each = int(np.clip(_DURATION / len(images), *_A_FRAME))
     durations = [each] * (len(images) - 1) + [each + _HOLD]
-    images[0].save(
-        path, save_all=True, append_images=images[1:], duration=durations, loop=0, optimize=False
-    )
+    with replacing(path) as part:
+        images[0].save(
+            part,
+            save_all=True,
+            append_images=images[1:],
+            duration=durations,
+            loop=0,
+            optimize=False,
+        )
 
 
 def _image(figure: Figure) -> Image.Image:

@@ -18,6 +18,8 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fenics_hytf.results.files import replacing
+
 RealArray = npt.NDArray[np.float64]
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
@@ -91,7 +93,8 @@ def save(figure: Figure, path: Path) -> None:
         figure: Made without pyplot, so that nothing keeps it and no display is asked for.
         path: The file.
     """
-    figure.savefig(path, metadata={"Software": "fenics_hytf"})
+    with replacing(path) as part:
+        figure.savefig(part, metadata={"Software": "fenics_hytf"})
 
 
 def length_unit(peak: float) -> tuple[float, str]:
