@@ -70,7 +70,7 @@ def study_accuracy(request: RunRequest, comm: MPI.Comm, budget: float | None = N
 
 def _prepare(request: RunRequest, comm: MPI.Comm, budget: float | None) -> tuple[Scene, str]:
     """The scene and the cell type of its mesh, after a look for all faults."""
-    scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
+    scene, faults = load_scene(request, comm)
     faults += folder_faults(request.folder, request.force)
     if budget is not None and not budget > 0:
         faults.append(f"--budget: found {budget:g}; expected a positive number of seconds")

@@ -50,7 +50,12 @@ SetOption = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="Override values of the scene; repeatable."),
 ]
 ForceOption = Annotated[
-    bool, typer.Option("--force", help="Replace a finished result, or an unfinished run.")
+    bool,
+    typer.Option(
+        "--force",
+        help="Replace a finished result, or an unfinished run; try what takes more memory than "
+        "there is.",
+    ),
 ]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress, no summary.")]
 PlotsOption = Annotated[bool, typer.Option("--no-plots", help="No figures, no report.")]
@@ -271,7 +276,12 @@ def accuracy(
     motion: MotionOption = None,
     overrides: SetOption = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Start anew; otherwise finished runs are kept.")
+        bool,
+        typer.Option(
+            "--force",
+            help="Start anew; otherwise finished runs are kept. Try what takes more memory than "
+            "there is.",
+        ),
     ] = False,
     budget: Annotated[
         float | None,

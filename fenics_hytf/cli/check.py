@@ -31,7 +31,7 @@ def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -
         SimulationError: The search for its factor of safety stopped.
         WriteError: If the figure could not be written.
     """
-    scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
+    scene, faults = load_scene(request, comm)
     if plot is not None:
         faults += comm.bcast(at_root(comm, lambda: figure_faults(plot)))
     if scene is None or faults:
@@ -96,12 +96,19 @@ def describe(inspection: Inspection, safety: float | None = None) -> str:
         ("continuity", inspection.continuity),
         ("complex modulus", inspection.complex_modulus),
         ("lines to solve", solved),
-        ("factorisations", f"at most {inspection.factorisations}"),
+        ("factorisations", _factorisations(inspection)),
         ("memory", f"about {inspection.memory_bytes / 2**20:.0f} MiB"),
         *([] if safety is None else [("stability", _stability(safety))]),
         *(("note", note) for note in inspection.notes),
     ]
     return "\n".join(["ok", *(f"  {name:15s} {text}" for name, text in rows)])
+
+
+def _factorisations(inspection: Inspection) -> str:
+    text = f"at most {inspection.factorisations}"
+    if not inspection.searched:
+        return text
+    return f"{text} of lines, and about {inspection.searched} to find what slips"
 
 
 def _stability(safety: float) -> str:

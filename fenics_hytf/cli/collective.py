@@ -3,16 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import TypeVar
 
 from mpi4py import MPI
 
-from fenics_hytf.cli.outcome import InputError, WriteError
+from fenics_hytf.cli.outcome import InputError, RunRequest, WriteError
 from fenics_hytf.results import ResultError
 from fenics_hytf.scene import Fault, Scene, SceneError, examine
-from fenics_hytf.simulation import mesh_faults
+from fenics_hytf.simulation import mesh_faults, room_faults
 
 T = TypeVar("T")
 
@@ -67,24 +66,28 @@ def at_root(comm: MPI.Comm, action: Callable[[], T]) -> T | None:
     return agree(comm, lambda: action() if comm.rank == 0 else None)
 
 
-def load_scene(
-    path: Path, overrides: Sequence[str], motion: Path | None, comm: MPI.Comm
-) -> tuple[Scene | None, list[str]]:
-    """Read a scene on every rank (collective).
+def load_scene(request: RunRequest, comm: MPI.Comm) -> tuple[Scene | None, list[str]]:
+    """Read a scene on every rank; no mesh is made that there is no memory for (collective).
 
     Args:
-        path: The scene file.
-        overrides: ``key=value``.
-        motion: Record in the place of the first motion's, or ``None``.
+        request: Names the scene file, overrides, a record, and whether memory is to be looked at.
         comm: Communicator.
 
     Returns:
         The scene, ``None`` on every rank if any refused it; and the faults.
     """
-    sections, faults = agree(comm, lambda: examine(path, overrides, motion))
+    sections, faults = agree(
+        comm, lambda: examine(request.scene, request.overrides, request.motion)
+    )
     refused: list[Fault] = next((found for found in comm.allgather(faults) if found), [])
-    if not refused:
-        return Scene.from_sections(sections), []
-    if comm.allreduce(sections.mesh is not None, MPI.LAND):
+    meshed = comm.allreduce(sections.mesh is not None, MPI.LAND)
+    scene = None if refused else Scene.from_sections(sections)
+    if meshed and not request.force:
+        no_room = room_faults(scene or sections, comm, request.group_size)
+        if no_room:
+            return None, [*map(str, refused), *no_room]
+    if scene is not None:
+        return scene, []
+    if meshed:
         refused = refused + mesh_faults(sections, comm)[1]
     return None, list(dict.fromkeys(str(fault) for fault in refused))

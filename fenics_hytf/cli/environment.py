@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 from glob import glob
 
 _DEBIAN = {
@@ -16,7 +17,7 @@ _WAYS = "or run it in the environment of docker/Dockerfile: docker/run hytf ..."
 
 def environment_faults() -> list[str]:
     """What is missing, and how to get it; empty if everything is there."""
-    faults = []
+    faults = _place_faults()
     for module, package in _DEBIAN.items():
         try:
             importlib.import_module(module)
@@ -26,6 +27,17 @@ def environment_faults() -> list[str]:
                 f"On Debian 13: apt-get install {package}; {_WAYS}"
             )
     return faults or _scalar_faults()
+
+
+def _place_faults() -> list[str]:
+    try:
+        os.getcwd()
+    except OSError as error:
+        return [
+            f"the folder one stands in: found none ({error.strerror}); expected one that is there. "
+            "Change to another"
+        ]
+    return []
 
 
 def _scalar_faults() -> list[str]:

@@ -78,6 +78,8 @@ def interruptible(
             say(f"hytf: {farewell()}", sys.stderr)
         comm.Abort(INTERRUPTED)
 
+    if comm is not None:  # PETSc takes a reader that has gone for a crash; Python raises OSError
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     # a process in the background may have been told to ignore Ctrl-C
     taken = [n for n in _SIGNALS if signal.getsignal(n) is not signal.SIG_IGN]
     before = [signal.signal(number, interrupt) for number in taken]

@@ -52,7 +52,7 @@ Command = Callable[[RunRequest, MPI.Comm], int]
 
 _GO_ON = "A run goes on after its last checkpoint with the same command and --resume"
 _LESS = (
-    "Take a coarser mesh, fewer lines (solver.max_frequency), sweep = \"reduced\", or more ranks on "
+    'Take a coarser mesh, fewer lines (solver.max_frequency), sweep = "reduced", or more ranks on '
     f"other computers. {_GO_ON}"
 )
 
@@ -141,7 +141,7 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
     scene: Scene | None = None
     force = request.force
     if request.demo is None:
-        scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
+        scene, faults = load_scene(request, comm)
         scene_hash = scene.hash if scene is not None else ""
     else:
         demo = request.demo
@@ -155,7 +155,7 @@ def _prepare(request: RunRequest, comm: MPI.Comm) -> tuple[Scene, bool]:
         raise InputError(faults)
     if copies is not None:
         at_root(comm, lambda: copy_demo(copies))
-        scene, faults = load_scene(request.scene, request.overrides, request.motion, comm)
+        scene, faults = load_scene(request, comm)
     if scene is None:
         raise InputError(faults)
     return scene, force

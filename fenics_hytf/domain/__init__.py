@@ -5,6 +5,7 @@ from fenics_hytf.domain.adjacency import bare_nodes, cells_at, facet_cells, neig
 from fenics_hytf.domain.checks import jacobian_determinants, refuse_inverted_cells
 from fenics_hytf.domain.constraints import boundary_nodes, constraint_matrix, normal_axis
 from fenics_hytf.domain.domain import Domain, build, examine, make_domain
+from fenics_hytf.domain.files import count_cells
 from fenics_hytf.domain.grids import MeshData
 from fenics_hytf.domain.side import distance_to_sides, side_column
 
@@ -16,6 +17,7 @@ __all__ = [
     "build",
     "cells_at",
     "constraint_matrix",
+    "count_cells",
     "distance_to_sides",
     "examine",
     "facet_cells",

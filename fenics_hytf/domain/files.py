@@ -89,6 +89,24 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
     return data
 
 
+def count_cells(path: Path) -> tuple[str, int, int, int]:
+    """What a mesh file holds, without a look at whether it makes a mesh.
+
+    Args:
+        path: The file.
+
+    Returns:
+        dolfinx's name of its cells, their dimension, how many there are, and the number of nodes.
+
+    Raises:
+        SceneError: The file cannot be read, or its cells are not such as make a mesh.
+    """
+    raw = _read(path)
+    kind = _cell_kind(raw, path)
+    name, gdim, *_ = _CELLS[kind]
+    return name, gdim, sum(len(b.data) for b in raw.cells if b.type == kind), len(raw.points)
+
+
 def _read(path: Path) -> meshio.Mesh:
     said = io.StringIO()
     expected = (

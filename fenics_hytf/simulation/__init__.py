@@ -16,6 +16,7 @@ from fenics_hytf.simulation.records import (
     SnapshotCallback,
     Work,
 )
+from fenics_hytf.simulation.room import room_faults
 from fenics_hytf.simulation.stability import factor_of_safety
 
 __all__ = [
@@ -34,5 +35,6 @@ __all__ = [
     "inspect",
     "mesh_faults",
     "peak_memory",
+    "room_faults",
     "simulate",
 ]

@@ -155,7 +155,8 @@ def write_checkpoint(
         if not folder.is_dir():
             folder.mkdir(parents=True)
             _to_disk(folder.parent)
-        with part.open("w+b") as file:
+        part.unlink(missing_ok=True)  # whatever stands there is not written through
+        with part.open("x+b") as file:
             _write_archive(file, meta, arrays)
             _seal(file)
         os.replace(part, path)

@@ -10,20 +10,13 @@ import numpy as np
 from mpi4py import MPI
 
 from fenics_hytf.domain import Domain, bare_nodes, constraint_matrix
-from fenics_hytf.lapse import Scheme, excite, scheme_of, seed_points
+from fenics_hytf.lapse import Scheme, scheme_of, seed_points
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
-from fenics_hytf.soil import HELD_DAMPING, RELAXATION_TIMES
+from fenics_hytf.simulation.demand import Demand, Sizes, demand_of, plan_of
+from fenics_hytf.soil import HELD_DAMPING
 
-# Entries of an LDLᵀ factor a row, from nested dissection: 2D c n log2 n (measured 7.6 M entries on
-# 81 002 unknowns, so c = 5.8), 3D c n^(4/3) (PORD on 41 k unknowns, so c = 1).
-_FACTOR_2D = 5.8
-_ENTRY = 16  # bytes of a complex number
-# Of a reduced sweep in a section with 2 to 5 % damping: 14 to 19, and 100 to 160.
-_EXPANSIONS = 20
-_BASIS = 200
 _NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio from which cells lock noticeably
-_BASE = 250e6  # bytes: interpreter, libraries, compiled forms
 
 
 @dataclass(frozen=True)
@@ -40,9 +33,10 @@ class Inspection:
         continuity: Which continuity, what it solves, and why it is this one.
         complex_modulus: Which convention, and why.
         lines: Lines solved in each lapse.
-        factorisations: Factorisations expected, those of free-field columns among them; with the
-            equivalent-linear loop the most there can be.
-        shared_bytes: Estimated memory of what ranks share that share a mesh [bytes].
+        factorisations: Factorisations of sweeps and of starts, see
+            :class:`~fenics_hytf.simulation.demand.Plan`.
+        searched: Factorisations that mechanisms are expected to take besides.
+        demand: Estimated memory.
         ranks: Ranks that share the mesh.
         notes: What the user should know.
     """
@@ -57,7 +51,8 @@ class Inspection:
     complex_modulus: str
     lines: tuple[int, ...]
     factorisations: int
-    shared_bytes: int
+    searched: int
+    demand: Demand
     ranks: int
     notes: tuple[str, ...]
 
@@ -68,7 +63,7 @@ class Inspection:
 
     def memory_of(self, ranks: int) -> int:
         """Estimated memory of so many ranks that share the mesh [bytes]."""
-        return self.shared_bytes + int(ranks * _BASE)
+        return self.demand.of(ranks, ranks)
 
 
 def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
@@ -94,23 +89,10 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
     T = constraint_matrix(domain, scene.supports, axes, bare)
     unknowns = int(T.getSize()[1])
     T.destroy()
-    lines = _lines(scene, scheme, axes)
-    loop = scene.effects.equivalent_linear
-    iterations = 1 if loop is None else loop.max_iterations
-    columns = list(scene.boundary.kinds.values()).count("free_field")
-    # What is carried over is one more side; beside a whole record it is swept on its own.
-    several = scheme.name != "steady" and len(lines) > 1
-    twice = several and scheme.name == "whole_record"
-    if scene.solver.sweep == "reduced":
-        solved, held = [min(n, _EXPANSIONS) for n in lines], _BASIS * (1 + twice)
-    else:
-        solved, held = list(lines), max(lines, default=0) * (len(axes) + several)
-    sweeps = sum(solved) + (sum(solved[1:]) if twice else 0)
-    # One more finds how a lapse starts; beside a whole record the first one starts at rest.
-    starts = {"steady": 0, "handover": len(lines), "whole_record": len(lines) - 1}[scheme.name]
-    counted = scene.effects.geometric_stiffness and scene.effects.gravity is not None
+    plan = plan_of(scene, scheme, domain.components)
+    lines = plan.lines
     num_points = comm.allreduce(len(points))
-    memory = _memory(unknowns, domain.gdim, held, _num_parts(scene))
+    sizes = Sizes(domain.gdim, domain.num_components, domain.num_cells, unknowns, num_points)
     return Inspection(
         effects=scene.effects.named,
         cells=domain.num_cells,
@@ -121,35 +103,15 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         continuity=_continuity(scene, scheme),
         complex_modulus=_complex_modulus(scene),
         lines=lines,
-        factorisations=(sweeps * (1 + columns) + starts) * iterations + counted * len(lines),
-        shared_bytes=memory + num_points * points.bytes_per_point,
+        factorisations=plan.factorisations,
+        searched=plan.searched,
+        demand=demand_of(scene, plan, sizes, points.bytes_per_point),
         ranks=comm.size,
         notes=(
             *_notes(scene, scheme, lines, domain.region_names),
             *_locking_notes(scene, domain),
         ),
     )
-
-
-def _lines(scene: Scene, scheme: Scheme, axes: tuple[int, ...]) -> tuple[int, ...]:
-    """Lines solved in each lapse."""
-    if scheme.contour is not None:
-        return (scheme.num_lines(scene.solver.max_frequency),) * len(scene.segments)
-    motion = scene.base_acceleration
-    return tuple(len(excite(scene, motion[:, s.samples], axes).lines) for s in scene.segments)
-
-
-def _num_parts(scene: Scene) -> int:
-    """Stiffness matrices of the law."""
-    return 1 + len(RELAXATION_TIMES) if scene.solver.complex_modulus == "maxwell" else 2
-
-
-def _memory(unknowns: int, gdim: int, columns: int, parts: int) -> int:
-    log = max(unknowns, 2).bit_length()
-    factor = _FACTOR_2D * unknowns * log if gdim == 2 else float(unknowns) ** (4 / 3)
-    row = (9 if gdim == 2 else 27) * gdim * 2
-    matrices = (6 + parts) * unknowns * row * (_ENTRY + 8)
-    return int(2 * factor * _ENTRY + matrices + unknowns * columns * _ENTRY)
 
 
 def _continuity(scene: Scene, scheme: Scheme) -> str:
