@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fenics_hytf.cli.outcome import DONE, INPUT, InputError, say, tell
 from fenics_hytf.motion import Record, write_at2, write_columns, write_csv
-from fenics_hytf.results import ResultError, folder_faults, read_summary, read_tables
+from fenics_hytf.results import ResultError, as_written, folder_faults, read_summary, read_tables
 from fenics_hytf.results.summary import moving_components
 from fenics_hytf.results.writers import QUANTITIES
 
@@ -79,8 +79,11 @@ def export_motions(request: ExportRequest) -> int:
     """
     try:
         summary = read_summary(request.folder)
-        _check_request(request, summary)
-        motions = list(_motions(request, summary))
+        with as_written(request.folder):
+            faults = _request_faults(request, summary)
+            motions = [] if faults else list(_motions(request, summary))
+        if faults:
+            raise InputError(faults)
         folder = request.output or Path(f"{request.folder.resolve().name}-motions")
         ending = (
             "" if request.quantity == TOTAL else f"_{request.quantity}"
@@ -99,8 +102,8 @@ def export_motions(request: ExportRequest) -> int:
     return DONE
 
 
-def _check_request(request: ExportRequest, summary: Mapping[str, Any]) -> None:
-    """Raise InputError with everything that is wrong with what was asked for."""
+def _request_faults(request: ExportRequest, summary: Mapping[str, Any]) -> list[str]:
+    """Everything that is wrong with what was asked for."""
     faults = []
     if request.format not in FORMATS:
         faults.append(f"--format: found {request.format}; expected {' or '.join(FORMATS)}")
@@ -117,8 +120,7 @@ def _check_request(request: ExportRequest, summary: Mapping[str, Any]) -> None:
             faults.append(f"RECEIVER: found {name}; expected one of {', '.join(known)}")
         elif request.quantity != TOTAL and name not in summary["receivers"]:
             faults.append(f"RECEIVER: found {name} with {request.quantity}; expected {TOTAL}")
-    if faults:
-        raise InputError(faults)
+    return faults
 
 
 def _base_names(summary: Mapping[str, Any]) -> list[str]:
@@ -130,6 +132,8 @@ def _base_names(summary: Mapping[str, Any]) -> list[str]:
 def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Motion]:
     """The motions asked for: of receivers all components that move, of the base the driven ones."""
     receivers, base = read_tables(request.folder, "receivers", "base")
+    if not summary["dt_s"] > 0:
+        raise ValueError(f"found a time step of {summary['dt_s']}")
     letter = _LETTERS[request.quantity]
     what = request.quantity.replace("_", " ")
     what = what if request.quantity == TOTAL else f"{what} relative to the base"
@@ -138,7 +142,7 @@ def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Mo
         if name in summary["receivers"]:
             place = ", ".join(f"{x:g}" for x in summary["receivers"][name]["place_m"])
             for component in moving_components(summary, name):
-                values = receivers[f"{name}.{letter}_{component}"]
+                values = np.asarray(receivers[f"{name}.{letter}_{component}"], np.float64)
                 yield _Motion(
                     name, component, values, f"{name} at ({place}) m, {component}: {what}"
                 )
@@ -148,7 +152,8 @@ def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Mo
         if not request.names or kind in request.names:
             for direction in summary["directions"]:
                 about = f"Base, {kind} motion, {direction}: acceleration"
-                yield _Motion(kind, direction, base[f"{kind}.A_{direction}"], about)
+                values = np.asarray(base[f"{kind}.A_{direction}"], np.float64)
+                yield _Motion(kind, direction, values, about)
 
 
 def _check_place(folder: Path, files: Sequence[str], force: bool) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fenics_hytf.cli.outcome import DONE, INPUT, say, tell
-from fenics_hytf.results import ResultError, locked, publish
+from fenics_hytf.results import ResultError, as_written, locked, publish
 
 
 def plot_result(folder: Path) -> int:
@@ -19,7 +19,7 @@ def plot_result(folder: Path) -> int:
         The exit code.
     """
     try:
-        with locked(folder):
+        with locked(folder), as_written(folder):
             written = publish(folder)
     except ResultError as error:
         tell([str(error)])

@@ -20,6 +20,7 @@ from fenics_hytf.results.folder import (
 from fenics_hytf.results.publish import publish
 from fenics_hytf.results.reader import (
     StoredResult,
+    as_written,
     read_result,
     read_summary,
     read_table,
@@ -34,6 +35,7 @@ __all__ = [
     "ResultError",
     "ResultFolder",
     "StoredResult",
+    "as_written",
     "describe_scene",
     "folder_faults",
     "is_result_of",

@@ -117,7 +117,7 @@ def is_result_of(folder: Path, scene_hash: str) -> bool:
     """
     try:
         summary = json.loads((folder / FINISHED).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return False
     return isinstance(summary, dict) and summary.get("scene_hash") == scene_hash
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -22,6 +23,9 @@ RealArray = npt.NDArray[np.float64]
 Table = Mapping[str, npt.NDArray[Any]]
 
 _TABLES = ("receivers", "base", "transfer", "spectra", "cells")
+NAME = re.compile(r"[\w-]+")
+"""Of receivers, directions and components, as the scene allows them."""
+
 _BLOCK = 20_000  # rows converted at once
 
 
@@ -103,6 +107,8 @@ def read_summary(folder: Path) -> dict[str, Any]:
         found = summary.get("format") if isinstance(summary, dict) else None
         if found != FORMAT:
             raise ValueError(f"{FINISHED} is of format {found}, this version reads {FORMAT}")
+        with as_written(folder):
+            _refuse_odd_names(summary)
     return dict(summary)
 
 
@@ -128,11 +134,37 @@ def readable(folder: Path) -> Iterator[None]:
     """Turn what can go wrong with a file into a message that says what to do."""
     try:
         yield
-    except (OSError, ValueError) as error:
-        raise ResultError(
-            f"{folder}: found a result that cannot be read ({error}); expected the files as a run "
-            "of this version wrote them. Run the scene again"
-        ) from error
+    except (OSError, ValueError, RecursionError) as error:
+        raise _unreadable(folder, error) from error
+
+
+@contextmanager
+def as_written(folder: Path) -> Iterator[None]:
+    """Turn what a result that no run wrote makes of its readers into a message.
+
+    A summary and tables are told by hundreds of names; they are not looked through beforehand.
+    """
+    try:
+        yield
+    except ResultError:
+        raise
+    except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError) as error:
+        raise _unreadable(folder, f"{type(error).__name__}: {error}") from error
+
+
+def _unreadable(folder: Path, reason: object) -> ResultError:
+    return ResultError(
+        f"{folder}: found a result that cannot be read ({reason}); expected the files as a run "
+        "of this version wrote them. Run the scene again"
+    )
+
+
+def _refuse_odd_names(summary: Mapping[str, Any]) -> None:
+    """Raise ValueError for names that end up in names of files and are none that a scene allows."""
+    names = [*summary["receivers"], *summary["directions"], *summary["components"]]
+    for name in names:
+        if not (isinstance(name, str) and NAME.fullmatch(name)):
+            raise ValueError(f"{FINISHED} has the name {name!r:.40}")
 
 
 def read_table(path: Path) -> dict[str, npt.NDArray[Any]]:

@@ -13,9 +13,10 @@ from __future__ import annotations
 import errno
 import hashlib
 import json
+import math
 import os
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,11 @@ FORMAT = 2
 FILE = "state.npz"
 
 _META = "meta.json"
+_ARRAY = ".npy"
+_HEADS = {
+    (1, 0): np.lib.format.read_array_header_1_0,
+    (2, 0): np.lib.format.read_array_header_2_0,
+}
 _DIGEST = 64  # bytes: SHA-256 in hexadecimal digits
 _BLOCK = 1 << 20
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -137,6 +143,25 @@ def require_same_scene(checkpoint: Checkpoint, scene: Scene) -> None:
         raise SceneError(faults)
 
 
+def require_sound(checkpoint: Checkpoint, path: Path) -> None:
+    """Refuse a checkpoint whose plain values are not of the kinds that :class:`Checkpoint` names.
+
+    Args:
+        checkpoint: The checkpoint.
+        path: Its folder.
+
+    Raises:
+        CheckpointError: With the value that is not.
+    """
+    meta = checkpoint.meta
+    counts = {"lapse": 0, "num_lapses": 1, "ranks": 1, "group_size": 1}
+    odd = [n for n, least in counts.items() if not isinstance(meta.get(n), int) or meta[n] < least]
+    odd += [n for n in ("versions", "decides", "state") if not isinstance(meta.get(n), dict)]
+    if odd:
+        found = f"a checkpoint that holds {meta.get(odd[0])!r:.40} for {odd[0]}"
+        raise CheckpointError(_damage(path / FILE, found))
+
+
 def write_checkpoint(
     folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]
 ) -> None:
@@ -215,7 +240,7 @@ def _write_archive(
         # ZipInfo without a date: the same state is the same file
         archive.writestr(zipfile.ZipInfo(_META), json.dumps(meta))
         for name, values in arrays.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
+            with archive.open(zipfile.ZipInfo(f"{name}{_ARRAY}"), "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, values, allow_pickle=False)
 
 
@@ -248,10 +273,18 @@ def _digest(file: IO[bytes]) -> tuple[bytes, int]:
 
 
 def _read_archive(path: Path, file: IO[bytes]) -> Checkpoint:
+    """Read what was sealed; the seal tells damage from the file that was written, not who wrote it.
+
+    So nothing is taken for granted that an archive says of itself: nothing is unpacked or inflated,
+    and no more memory is taken than the file has bytes.
+    """
     arrays: Arrays = {}
+    size = file.seek(0, os.SEEK_END)
     file.seek(0)
     try:
         with zipfile.ZipFile(file) as archive:
+            members = archive.infolist()
+            _refuse_odd_members(members, size)
             meta = json.loads(archive.read(_META))
             found = meta.get("format") if isinstance(meta, dict) else None
             if found != FORMAT:
@@ -260,14 +293,50 @@ def _read_archive(path: Path, file: IO[bytes]) -> Checkpoint:
                     "version reads. Go on with the version that wrote it, or start anew: --force "
                     "instead of --resume"
                 )
-            for name in archive.namelist():
-                if name.endswith(".npy"):
-                    with archive.open(name) as member:
-                        values = np.lib.format.read_array(member, allow_pickle=False)
-                    arrays[name.removesuffix(".npy")] = values
-    except (zipfile.BadZipFile, ValueError, KeyError, EOFError, NotImplementedError) as error:
+            for member in members:
+                if member.filename != _META:
+                    arrays[member.filename.removesuffix(_ARRAY)] = _read_array(archive, member)
+    except (
+        zipfile.BadZipFile,
+        ValueError,
+        KeyError,
+        EOFError,
+        NotImplementedError,
+        RecursionError,
+    ) as error:
         raise CheckpointError(_damage(path, f"no checkpoint ({error})")) from error
     return Checkpoint(meta, arrays)
+
+
+def _refuse_odd_members(members: Sequence[zipfile.ZipInfo], size: int) -> None:
+    """Raise ValueError unless members are as :func:`_write_archive` writes them."""
+    names = [member.filename for member in members]
+    if len(set(names)) < len(names):
+        raise ValueError("two members of one name")
+    for member in members:
+        if member.compress_type != zipfile.ZIP_STORED:
+            raise ValueError(f"a squeezed member, {member.filename}")
+        parts = member.filename.split("/")
+        if (member.filename != _META and not member.filename.endswith(_ARRAY)) or ".." in parts:
+            raise ValueError(f"a member that no run writes, {member.filename}")
+        if "" in parts:
+            raise ValueError(f"a member at an absolute place, {member.filename}")
+    if sum(member.file_size for member in members) > size:
+        raise ValueError("members larger than the file")
+
+
+def _read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> npt.NDArray[Any]:
+    """Read an array whose head claims no more than follows it; no objects."""
+    with archive.open(member) as file:
+        version = np.lib.format.read_magic(file)
+        if version not in _HEADS:
+            raise ValueError(f"{member.filename} is of version {version}")
+        shape, _, dtype = _HEADS[version](file)
+        if math.prod(shape) * dtype.itemsize != member.file_size - file.tell():
+            raise ValueError(f"{member.filename} claims a shape of {shape!r:.40}")
+        file.seek(0)
+        values: npt.NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+    return values
 
 
 def _to_disk(folder: Path) -> None:

@@ -14,6 +14,7 @@ from fenics_hytf.simulation.checkpoint import (
     Checkpoint,
     read_checkpoint,
     require_same_scene,
+    require_sound,
     take_checkpoint,
     versions,
     write_checkpoint,
@@ -107,6 +108,7 @@ class CheckpointFolder:
     def _read(self) -> Checkpoint | None:
         found = read_checkpoint(self.path)
         if found is not None:
+            require_sound(found, self.path)
             require_same_scene(found, self._scene)
         return found
 
