@@ -207,6 +207,7 @@ def _regions(
         found = f"{len(bare)} cells in no region, the first round {centroids[bare[0]].tolist()} m"
         expected = "a region for every cell: add a last one without 'below' and 'polygon'"
         raise SceneError([Fault("mesh.regions", found, expected)])
-    soil_of = [region.soil for region in mesh.regions] or [soils[0]]
+    # Without a soil, which is a fault of its own, the rest of the mesh is looked at all the same.
+    soil_of = [region.soil for region in mesh.regions] or [*soils, ""][:1]
     names = tuple(dict.fromkeys(soil_of))
     return np.array([names.index(soil) for soil in soil_of], np.int32)[owner], names

@@ -420,6 +420,16 @@ def test_faults_of_scene_mesh_and_receivers_are_told_at_once(here, hytf):
     assert code == 2 and files(here) == before
 
 
+def test_a_box_without_soils_is_told_with_the_faults_of_its_mesh(here, hytf):
+    start, end = SCENE.index("column ="), SCENE.index("[[motion]]")
+    box = "box = { size = [1.0, 8.0], cells = [1, 4] }\n"
+    Path("s.toml").write_text("soil = {}\n" + SCENE[:start] + box + SCENE[end:])
+    for command in ("check", "run"):
+        code, out, err = hytf(command, "s.toml")
+        assert (code, out) == (2, "")
+        assert "soil: found an empty table" in err
+
+
 def test_a_motion_of_nothing_gives_a_result(here, hytf):
     Path("s.toml").write_text(SCENE.replace("amplitude = 1.0", "amplitude = 0.0"))
     code, _, err = hytf("run", "s.toml", "--quiet")
