@@ -95,9 +95,10 @@ class Moduli:
 
     def change(self, old: Moduli) -> RealArray:
         """The larger relative change of G and D from ``old``, shape ``(num_cells,)``."""
-        tiny = np.finfo(float).tiny
+        # Curves may begin without damping: what has fallen to nothing has changed by a number.
+        least = np.maximum(np.finfo(float).eps * old.damping, np.finfo(float).tiny)
         modulus = np.abs(self.shear_modulus - old.shear_modulus) / self.shear_modulus
-        damping = np.abs(self.damping - old.damping) / np.maximum(self.damping, tiny)
+        damping = np.abs(self.damping - old.damping) / np.maximum(self.damping, least)
         return np.maximum(modulus, damping)
 
 

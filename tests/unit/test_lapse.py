@@ -20,6 +20,7 @@ from fenics_hytf.lapse import (
     EmptyCellError,
     Excitation,
     Material,
+    Moduli,
     Part,
     Response,
     Spectra,
@@ -111,6 +112,14 @@ def test_damping_counts_where_the_modulus_is_flat():
     moduli, effective, history = run(soil, lambda m: 5e-5 / m.damping, 1e-2)
     assert len(history.change) > 2
     assert misfit(soil, moduli, effective) <= 1e-4
+
+
+def test_damping_that_falls_to_nothing_changes_by_a_number():
+    none, some = (Moduli(np.array([GMAX]), np.array([d])) for d in (0.0, 0.05))
+    assert none.change(none).tolist() == [0.0]
+    assert some.change(none).tolist() == [1.0]
+    # The change is over what is there now: next to nothing here, but not 1e306 of it.
+    assert none.change(some) == pytest.approx(1 / EPS)
 
 
 def test_a_linear_soil_takes_one_solve():
