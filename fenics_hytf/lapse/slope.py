@@ -55,6 +55,8 @@ class Slope:
     def __init__(self, scene: Scene, domain: Domain, statics: Statics) -> None:
         assert scene.effects.sliding is not None
         self._domain, self._statics, self._settings = domain, statics, scene.effects.sliding
+        shaken = {domain.components.index(m.direction) for m in scene.motion}
+        self._level = sorted(shaken - {domain.gdim - 1})
         soils = [scene.soil[name] for name in domain.region_names]
         self._cohesion = np.array([soil.cohesion or 0.0 for soil in soils])
         self._friction_angle = np.array([soil.friction_angle or 0.0 for soil in soils])
@@ -101,6 +103,29 @@ class Slope:
         mean = total / np.where(volume > 0, volume, 1.0)
         return np.where(volume > 0, np.maximum(mean, _LEAST_STRENGTH * mean.max()), 1.0)
 
+    def moves(self, axis: int) -> bool:
+        """Whether anything can move for good along an axis, as the ground is held (collective)."""
+        T = self._statics.unknowns.T
+        unknowns, nodes = T.createVecs()
+        nodes.array[axis :: self._domain.gdim] = 1.0
+        T.multTranspose(nodes, unknowns)
+        free = bool(unknowns.norm() > 0)
+        unknowns.destroy()
+        nodes.destroy()
+        return free
+
+    def _require_motion(self) -> None:
+        """Raise where the shaking can move nothing along the ground."""
+        if any(self.moves(axis) for axis in self._level):
+            return
+        along = " and ".join("xyz"[axis] for axis in self._level)
+        found = f"boundaries that hold every node of soil along {along}"
+        expected = (
+            "ground that can move for good where it is shaken: sides that are free or tied, or "
+            "more than a cell apart (dashpot and free_field hold the static stress as rollers do)"
+        )
+        raise SceneError([Fault("effects.sliding", found, expected)])
+
     def factor_of_safety(self) -> float:
         """The factor of safety at rest (collective).
 
@@ -108,10 +133,14 @@ class Slope:
             The factor of safety [-]; infinite where gravity shears nothing, as in level ground.
 
         Raises:
-            SceneError: It is below 1, and the scene does not ask for ground that does not stand.
+            SceneError: It is below 1, and the scene does not ask for ground that does not stand;
+                or nothing can slide.
             MechanismError: No mechanism was found.
         """
         assert self._gravity is not None
+        self._require_motion()
+        if not self.moves(self._domain.gdim - 1):
+            return np.inf
         safety = self._search.factor_of_safety(
             self._statics.unknowns, self._weight, self._strength, self._gravity
         )

@@ -89,6 +89,33 @@ def test_of_level_ground(cut, hytf):
     assert told(out) == "no factor of safety at rest: gravity shears nothing"
 
 
+@pytest.mark.parametrize("side", ["dashpot", "free_field"])
+def test_ground_that_nothing_lets_slide_is_a_fault(cut, hytf, side):
+    """One cell between two sides that hold it has nowhere to go."""
+    sections = CUT.index("[soil"), CUT.index("[boundary]"), CUT.index("[effects]")
+    soil, effects = CUT[sections[0] : sections[1]], CUT[sections[2] :]
+    Path("held.toml").write_text(LEVEL.replace("tied", side) + soil + effects)
+    for command in ("check", "run"):
+        code, _, err = hytf(command, "held.toml")
+        assert code == 2
+        assert "effects.sliding: found boundaries that hold every node of soil along x" in err
+    assert not Path("held-result").exists()
+
+
+def test_shaken_in_two_directions_it_slides_where_it_can(cut, hytf):
+    """A column a cell thick is held across by free field, and slides along the other axis."""
+    text = CUT.replace("[2.5, 1.5]", "[1.0, 2.0, 1.0]").replace("[50, 30]", "[1, 2, 2]")
+    start, end = text.index("empty"), text.index("[soil")
+    boundary = 'left = "roller"\nright = "roller"\nfront = "tied"\nback = "tied"\n'
+    text = text[:start] + text[end:].replace('left = "roller"\nright = "roller"\n', boundary)
+    y = '[[motion]]\ndirection = "y"\nharmonic = { amplitude = 1.0, frequency = 2.0, '
+    Path("s.toml").write_text(
+        text.replace("[boundary]", y + "cycles = 1, samples = 32 }\n[boundary]")
+    )
+    code, _, err = hytf("run", "s.toml", "--no-plots", "--quiet")
+    assert (code, err) == (0, "")
+
+
 def test_nothing_is_looked_for_where_nothing_slides(cut, hytf, monkeypatch):
     monkeypatch.setattr("fenics_hytf.cli.check.factor_of_safety", None)  # fails if it is called
     code, out, err = hytf("check", "cut.toml", "--set", "effects.sliding=false")
