@@ -26,6 +26,7 @@ from fenics_hytf.domain.files import read_mesh
 from fenics_hytf.domain.grids import MeshData, box_mesh, column_mesh, emptied
 from fenics_hytf.domain.refine import refined
 from fenics_hytf.scene import (
+    MOST_CELLS,
     Fault,
     Scene,
     SceneError,
@@ -241,6 +242,7 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
         data = box_mesh(mesh.box, mesh, soils)
     else:
         data = read_mesh(Path(mesh.file or ""), (*soils, *mesh.empty))
+        _require_few(len(data.cells) * 2 ** (data.points.shape[1] * mesh.refine), mesh.refine)
         for _ in range(mesh.refine):
             data = refined(data)
     faults = _unknown_regions(mesh.empty, data)
@@ -248,6 +250,13 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
     if not data.region_names:
         faults.append(Fault("mesh.empty", "every region of the mesh", "one with soil"))
     return data, faults if mesh.file is None else [*faults, *_file_faults(scene, data)]
+
+
+def _require_few(num_cells: int, refine: int) -> None:
+    """Raise where a refined mesh would have more cells than can be made."""
+    if num_cells > MOST_CELLS:
+        found = f"{refine}, which makes {num_cells} cells"
+        raise SceneError([Fault("mesh.refine", found, f"at most {MOST_CELLS} in all")])
 
 
 def _unknown_regions(empty: tuple[str, ...], data: MeshData) -> list[Fault]:

@@ -10,7 +10,7 @@ from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.continuity import short_lapses
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
-from fenics_hytf.scene.mesh import Box, Column, Layer, Mesh, components_of
+from fenics_hytf.scene.mesh import MOST_CELLS, Box, Column, Layer, Mesh, components_of
 from fenics_hytf.scene.motion import MotionInput, direction_fault
 from fenics_hytf.scene.output import Output, Receiver
 from fenics_hytf.scene.quadrature import (
@@ -33,6 +33,7 @@ from fenics_hytf.scene.settings import (
 from fenics_hytf.scene.soil import Soil
 
 __all__ = [
+    "MOST_CELLS",
     "Boundary",
     "Box",
     "Calm",

@@ -7,6 +7,7 @@ In 2D y is up, in 3D z is up, and the base of a column or box is at height 0.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,6 +25,7 @@ from fenics_hytf.scene.table import (
     Several,
     Table,
     as_list,
+    as_number,
     exactly_one,
     number,
     read_table,
@@ -35,6 +37,9 @@ BOUNDARIES = {
     3: ("base", "top", "left", "right", "front", "back"),
 }
 AXES = ("x", "y", "z")
+MOST_CELLS = 10_000_000
+"""Cells of a mesh: about a kilobyte each while it is made, before its memory can be foretold."""
+
 _MOST_CELLS = 1_000_000  # along one direction; more is a slip of the pen
 _MOST_CHECKED = 10_000_000  # cells of a box whose regions are checked here
 _CHECKED_AT_ONCE = 1_000_000
@@ -163,6 +168,7 @@ class Mesh(Table):
         """One source; rules of the tables below; points a cell; kinematics."""
         yield from exactly_one(raw, key, "column", "box", "file")
         gdim = raw_gdim(raw)
+        yield from _size_rules(raw, key)
         if isinstance(raw.get("box"), dict):
             yield from Box.rules(raw["box"], join_key(key, "box"))
         if "regions" in raw and "box" not in raw:
@@ -326,6 +332,23 @@ def raw_components(raw: object) -> tuple[str, ...] | None:
         return None
     kinematics = raw.get("kinematics")
     return components_of(gdim, kinematics if isinstance(kinematics, str) else None)
+
+
+def _size_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:
+    """Not too many cells in all, where those along each direction or in each layer are in range."""
+    box, column = raw.get("box"), raw.get("column")
+    if isinstance(box, dict):
+        where, cells = join_key(key, "box.cells"), as_list(box.get("cells"))
+        total = prod(as_number(n) or 0.0 for n in cells)
+    elif isinstance(column, dict):
+        where = join_key(key, "column.layers")
+        layers = [layer for layer in as_list(column.get("layers")) if isinstance(layer, dict)]
+        cells = [layer.get("cells") for layer in layers]
+        total = sum(as_number(n) or 0.0 for n in cells)
+    else:
+        return
+    if total > MOST_CELLS and max(as_number(n) or 0.0 for n in cells) <= _MOST_CELLS:
+        yield Fault(where, f"{total:g} cells", f"at most {MOST_CELLS} in all")
 
 
 def _points_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:

@@ -110,6 +110,13 @@ def test_numbers_that_are_refused(tmp_path, times):
         scene({"file": file, "refine": times})
 
 
+def test_more_cells_than_can_be_made(tmp_path, monkeypatch):
+    file = str(gmsh_section(tmp_path / "a.msh"))
+    monkeypatch.setattr("fenics_hytf.domain.domain.MOST_CELLS", 1000)
+    with pytest.raises(SceneError, match=r"mesh\.refine: found 4, which makes \d+ cells"):
+        build(scene({"file": file, "refine": 4}), MPI.COMM_SELF)
+
+
 def test_a_box_has_numbers_of_cells():
     mesh = {"box": {"size": [1.0, 1.0], "cells": [1, 1]}, "refine": 1}
     with pytest.raises(SceneError, match=r"mesh\.refine: found 1; expected nothing without file"):
