@@ -18,6 +18,10 @@ Time steps found from printed times are good to about that; a lapse that is long
 asked for by a fraction of a sample would not be what the scene says.
 """
 
+_MOST_LAPSES = 10_000
+_MOST_SAMPLES = 10_000_000
+"""Lapses, and samples of all of them with the zeros at the end; more is a slip of the pen."""
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -64,7 +68,8 @@ def split(
 
     Raises:
         ValueError: If both are given, one is out of range, a lapse would have fewer than two
-            samples, or the duration is not a whole number of time steps within 1e-6 of it.
+            samples, the duration is not a whole number of time steps within 1e-6 of it, or there
+            are more lapses, or zeros after the record, than anyone means.
     """
     if count is not None and duration is not None:
         raise ValueError(f"count: found duration = {duration} as well; expected one of them")
@@ -81,6 +86,12 @@ def split(
         asked = f"duration: found {duration:g} s with time steps of {dt:g} s"
     if samples < 2:
         raise ValueError(f"{asked}; expected at least 2 samples a lapse; make the lapses longer")
+    if count > _MOST_LAPSES:
+        raise ValueError(f"{asked}; expected at most {_MOST_LAPSES} lapses; make them longer")
+    if count * samples > max(_MOST_SAMPLES, 2 * num_samples):
+        raise ValueError(
+            f"{asked}; expected at most {_MOST_SAMPLES} samples in all; make the lapses shorter"
+        )
     return [Segment(index, index * samples, samples) for index in range(count)]
 
 

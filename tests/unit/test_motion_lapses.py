@@ -77,8 +77,17 @@ def test_duration_must_be_a_whole_number_of_steps():
         ({"duration": -1.0}, "positive"),
         ({"duration": np.nan}, "positive"),
         ({"duration": np.inf}, "positive"),
+        ({"duration": 1e6}, "at most 10000000 samples in all"),
+        ({"duration": 1e300}, "at most 10000000 samples in all"),
     ],
 )
 def test_invalid(arguments, message):
     with pytest.raises(ValueError, match=message):
         split(100, 0.01, **arguments)
+
+
+def test_more_lapses_than_anyone_means():
+    for cut in ({"count": 10_001}, {"duration": 0.09}):
+        with pytest.raises(ValueError, match="at most 10000 lapses"):
+            split(100_000, 0.01, **cut)
+    assert len(split(100_000, 0.01, count=10_000)) == 10_000
