@@ -42,7 +42,7 @@ from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
 from fenics_hytf.scene.output import Output, read_output
 from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver
 from fenics_hytf.scene.soil import Soil, read_curves, read_soils
-from fenics_hytf.scene.table import as_list, number, read_table, unknown_key
+from fenics_hytf.scene.table import as_list, as_number, number, read_table, unknown_key
 
 SECTIONS = (
     "title",
@@ -56,6 +56,9 @@ SECTIONS = (
     "solver",
     "output",
 )
+
+# Powers of such numbers, as in energies and their squares, are numbers too.
+_SMALLEST, _LARGEST = 1e-30, 1e30
 
 # G* of Dormieux is G(√(1 − 4D²) + 2iD), that of SHAKE91 G(1 − 2D² + ...).
 _MOST_DAMPING = {"dormieux": 0.5, "shake91": 0.5**0.5}
@@ -118,6 +121,8 @@ def check(data: object, folder: Path | str) -> tuple[Sections, list[Fault]]:
         faults += _time_rules(raw, sections)
         faults += _damping_rules(raw, sections)
         faults += _settle_continuity(raw, sections)
+    told = tuple(fault.key for fault in faults)
+    faults += [fault for fault in _odd_sizes(raw) if not fault.key.startswith(told)]
     order = {name: i for i, name in enumerate(SECTIONS)}
     faults.sort(key=lambda fault: order.get(fault.key.split(".")[0].split("[")[0], -1))
     return sections, faults
@@ -157,6 +162,20 @@ def _read_sections(raw: dict[str, Any], folder: Path) -> tuple[Sections, list[Fa
     size = None if drawn is None else drawn.size
     sections.output, found = read_output(raw.get("output", {}), gdim, size)
     return sections, faults + found
+
+
+def _odd_sizes(raw: object, key: str = "") -> Iterator[Fault]:
+    """Numbers so large or small that what follows from them overflows or vanishes."""
+    if isinstance(raw, dict):
+        for name, value in raw.items():
+            yield from _odd_sizes(value, join_key(key, name_key(name)))
+    elif isinstance(raw, list | tuple):
+        for i, value in enumerate(raw):
+            yield from _odd_sizes(value, join_key(key, i))
+    size = abs(as_number(raw) or 0.0)
+    if size and not _SMALLEST <= size <= _LARGEST:
+        expected = f"0, or a number from {_SMALLEST:g} to {_LARGEST:g} in size"
+        yield Fault(key, toml_text(raw), expected)
 
 
 def _unknown_sections(raw: dict[str, Any]) -> Iterator[Fault]:
