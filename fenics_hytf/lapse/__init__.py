@@ -17,6 +17,7 @@ from fenics_hytf.lapse.errors import (
     EquivalentLinearError,
     GeometricInstability,
     LapseError,
+    PeakError,
     VolumeError,
 )
 from fenics_hytf.lapse.excitation import Excitation
@@ -76,6 +77,7 @@ __all__ = [
     "Moduli",
     "Observer",
     "Part",
+    "PeakError",
     "ReceiverProbe",
     "Response",
     "Scheme",

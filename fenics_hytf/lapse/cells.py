@@ -15,6 +15,7 @@ from petsc4py import PETSc
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.frequency import share
+from fenics_hytf.lapse.errors import PeakError
 from fenics_hytf.lapse.material import Material
 from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.response import Response, Spectra
@@ -34,6 +35,7 @@ RealArray = npt.NDArray[np.float64]
 _BLOCK = 256  # cells whose spectra are held at once
 _AT_ONCE = 64  # blocks whose rows are made at once
 _FEW = 64  # cells whose histories are held at once: they stay in the cache
+_BEYOND = 1e18  # of peaks in SI units: single precision has squares up to 3e38
 
 
 @dataclass(frozen=True)
@@ -237,12 +239,20 @@ class CellProbe:
         return CellPeaks(*self._gather(peak).T)
 
     def _gather(self, peak: RealArray) -> RealArray:
-        """All cells in the order of the input, from the ranks that looked at them."""
+        """All cells in the order of the input, from the ranks that looked at them.
+
+        Raises:
+            PeakError: A value beyond what single precision has squares of; on every rank.
+        """
         if self._domain.across.size > 1:
             self._domain.across.Allreduce(MPI.IN_PLACE, peak, MPI.MAX)
         if self._empty is not None:
             peak[self._empty] = 0.0
-        return self._domain.gather_cells(peak)
+        everywhere = self._domain.gather_cells(peak)
+        beyond = np.flatnonzero(~(everywhere < _BEYOND).all(axis=1))
+        if len(beyond):
+            raise PeakError([int(cell) for cell in beyond])
+        return everywhere
 
 
 class _StressHistories:

@@ -135,7 +135,9 @@ def _ride(
                 "lame_lambda": constants.lame_lambda[cells],
                 "shear_modulus": constants.shear_modulus[cells],
             }
-        update_kinematics(points, gradient, **moduli, plastic=plastic)
+        # Stress overflows in points that collapse or are thrown out: volume or place tells.
+        with np.errstate(over="ignore", invalid="ignore"):
+            update_kinematics(points, gradient, **moduli, plastic=plastic)
         if "piece" in points.history:
             carry_pieces(points, moved)
     return np.asarray(displacement)

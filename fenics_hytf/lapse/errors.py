@@ -116,3 +116,20 @@ class VolumeError(LapseError):
             f"at the start, the first: {listed}; expected 0.1 to 10 times: the response is not to "
             "be trusted; use shorter lapses, or look at the stiffness there"
         )
+
+
+class PeakError(LapseError):
+    """Peaks of cells are no numbers, or beyond what can be computed with.
+
+    Attributes:
+        cells: Their numbers in the input.
+    """
+
+    def __init__(self, cells: list[int]) -> None:
+        self.cells = cells
+        listed = ", ".join(str(cell) for cell in cells[:5])
+        super().__init__(
+            f"found peaks of {len(cells)} cells out of bounds, the first: {listed}; expected "
+            "strains, stresses and motions below 1e18: look at the units of the motion, of lengths "
+            "and of moduli"
+        )

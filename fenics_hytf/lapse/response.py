@@ -124,8 +124,10 @@ class Response:
             Shape ``(..., num_samples)``, of the precision of the spectra.
         """
         given, values = self.excitation, spectra.coefficients
-        factor = (given.s**derivative).astype(values.dtype)
-        history = given.to_time(values * factor if derivative else values)
+        # What overflows single precision is told by the peaks of the cells.
+        with np.errstate(over="ignore", invalid="ignore"):
+            factor = (given.s**derivative).astype(values.dtype)
+            history = given.to_time(values * factor if derivative else values)
         if spectra.start is not None and given.start is not None:
             functions = given.start.in_time(given.num_samples, derivative)
             history += spectra.start.astype(history.dtype) @ functions.astype(history.dtype)

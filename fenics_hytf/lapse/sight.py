@@ -91,8 +91,10 @@ class _ByLines:
 
     def stress(self, seen: Spectra, moduli: RealArray) -> RealArray:
         values = seen.coefficients
-        factor = (moduli @ self._functions).astype(values.dtype)
-        history = self._response.excitation.to_time(factor[:, None, :] * values)
+        # What overflows single precision is told by the peaks of the cells.
+        with np.errstate(over="ignore", invalid="ignore"):
+            factor = (moduli @ self._functions).astype(values.dtype)
+            history = self._response.excitation.to_time(factor[:, None, :] * values)
         if self._start is not None and seen.start is not None:
             functions = np.tensordot(moduli, self._start, axes=1).astype(history.dtype)
             history += seen.start.astype(history.dtype) @ functions

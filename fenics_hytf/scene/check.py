@@ -42,7 +42,15 @@ from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
 from fenics_hytf.scene.output import Output, read_output
 from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver
 from fenics_hytf.scene.soil import Soil, read_curves, read_soils
-from fenics_hytf.scene.table import as_list, as_number, number, read_table, unknown_key
+from fenics_hytf.scene.table import (
+    LARGEST,
+    SMALLEST,
+    as_list,
+    as_number,
+    number,
+    read_table,
+    unknown_key,
+)
 
 SECTIONS = (
     "title",
@@ -56,9 +64,6 @@ SECTIONS = (
     "solver",
     "output",
 )
-
-# Powers of such numbers, as in energies and their squares, are numbers too.
-_SMALLEST, _LARGEST = 1e-30, 1e30
 
 # G* of Dormieux is G(√(1 − 4D²) + 2iD), that of SHAKE91 G(1 − 2D² + ...).
 _MOST_DAMPING = {"dormieux": 0.5, "shake91": 0.5**0.5}
@@ -173,8 +178,8 @@ def _odd_sizes(raw: object, key: str = "") -> Iterator[Fault]:
         for i, value in enumerate(raw):
             yield from _odd_sizes(value, join_key(key, i))
     size = abs(as_number(raw) or 0.0)
-    if size and not _SMALLEST <= size <= _LARGEST:
-        expected = f"0, or a number from {_SMALLEST:g} to {_LARGEST:g} in size"
+    if size and not SMALLEST <= size <= LARGEST:
+        expected = f"0, or a number from {SMALLEST:g} to {LARGEST:g} in size"
         yield Fault(key, toml_text(raw), expected)
 
 
@@ -280,7 +285,7 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
     yield from continuity_rules(raw, lapses, solver, motions, segments)
     if effects.sliding is not None:
         duration = max(segment.num_samples for segment in segments) * dt
-        yield from rules_with_sliding(effects.sliding, lapses, solver, duration)
+        yield from rules_with_sliding(effects.sliding, lapses, solver, duration, dt)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
     if handed_over and effects.softening and effects.convection:
         yield from rules_with_softening(solver)

@@ -23,6 +23,7 @@ from fenics_hytf.scene.table import as_list
 
 _ABOVE_BAND = 2.0  # f_max over the frequency below which 99 % of the energy lies
 _PERIODS = 10.0  # f_max times the length of a lapse
+_MOST_REST = 10_000_000  # samples after the motion: 80 MB of zeros for each
 _MOST_STEPS = 100_000  # of the march in a lapse: its time goes with their square, here some 10 s
 
 
@@ -67,7 +68,7 @@ def resolve(
 
 
 def rules_with_sliding(
-    sliding: Sliding, lapses: Lapses, solver: Solver, duration: float
+    sliding: Sliding, lapses: Lapses, solver: Solver, duration: float, dt: float
 ) -> Iterator[Fault]:
     """What a mechanism that slides needs of lapses and law.
 
@@ -76,6 +77,7 @@ def rules_with_sliding(
         lapses: ``[lapses]``, resolved.
         solver: ``[solver]``, resolved.
         duration: Of the longest lapse [s].
+        dt: Time step of the motions [s].
 
     Yields:
         The faults.
@@ -89,6 +91,9 @@ def rules_with_sliding(
     if duration > _MOST_STEPS * sliding.time_step:
         expected = f"at least {duration / _MOST_STEPS:.3g} s, {_MOST_STEPS} steps a lapse"
         yield Fault("effects.sliding.time_step", f"{sliding.time_step:g}", expected)
+    if sliding.longest > _MOST_REST * dt:
+        expected = f"at most {_MOST_REST * dt:.3g} s, {_MOST_REST} samples"
+        yield Fault("effects.sliding.longest", f"{sliding.longest:g}", expected)
 
 
 def rules_with_softening(solver: Solver) -> Iterator[Fault]:

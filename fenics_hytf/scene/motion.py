@@ -16,6 +16,7 @@ from fenics_hytf import motion as records
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
 from fenics_hytf.scene.mesh import AXES, is_file
 from fenics_hytf.scene.table import (
+    LARGEST,
     Positive,
     Table,
     at_most_one,
@@ -29,6 +30,8 @@ from fenics_hytf.scene.table import (
 SOURCES = ("file", "harmonic", "record", "synthetic")
 _MOST_SAMPLES = 10_000_000  # 80 MB; more is a slip of the pen
 _MOST_SINES = 100_000_000  # samples times frequencies of a synthetic record: 800 MB
+
+_SHORTEST, _LONGEST = 1e-5, 1e6  # time steps [s]; response spectra take 10 s of the shortest
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,6 +182,9 @@ def _read_motion(raw: object, folder: Path, key: str) -> tuple[MotionInput | Non
         return None, faults
     record, found = _read_record(raw, source, folder, where)
     faults += found
+    if record is not None and not _SHORTEST <= record.dt <= _LONGEST:
+        expected = f"one from {_SHORTEST:g} to {_LONGEST:g} s"
+        faults.append(Fault(where, f"a time step of {record.dt:g} s", expected))
     if table is None or record is None or faults:
         return None, faults
     try:
@@ -187,6 +193,10 @@ def _read_motion(raw: object, folder: Path, key: str) -> tuple[MotionInput | Non
     except ValueError as error:
         name = "scale" if table.pga is None else "pga"
         return None, [fault_from(error, join_key(key, name), toml_text(raw.get(name)))]
+    if record.pga > LARGEST:
+        return None, [
+            Fault(where, f"accelerations up to {record.pga:g} m/s2", f"at most {LARGEST:g} m/s2")
+        ]
     return MotionInput(table.direction, record, table.input), []
 
 

@@ -14,7 +14,9 @@ from pydantic import Field
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
 from fenics_hytf.scene.mesh import is_file
 from fenics_hytf.scene.table import (
+    LARGEST,
     NAME,
+    SMALLEST,
     Fraction,
     NotNegative,
     Positive,
@@ -192,6 +194,9 @@ def _constants_faults(soil: Soil, table: object, key: str) -> list[Fault]:
         elastic = soil.elastic
     except (ValueError, ArithmeticError) as error:
         return [fault_from(error, key, toml_text(table))]
+    if not SMALLEST <= elastic.shear_modulus <= LARGEST:
+        found = f"a shear modulus of {elastic.shear_modulus:g} Pa"
+        return [Fault(key, found, f"one from {SMALLEST:g} to {LARGEST:g} Pa")]
     if soil.curves is None:
         return []
     return read_curves(soil.curves, join_key(key, "curves"), elastic=elastic)[1]

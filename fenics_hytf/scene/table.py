@@ -22,6 +22,9 @@ from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
 NAME = re.compile(r"[^,\"\x00-\x1f\x7f]+")
 """Names of soils and regions, which are a column of a CSV file."""
 
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes of numbers but 0: powers of these, as in energies and their squares, are numbers too."""
+
 Name = Annotated[str, Field(min_length=1)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]

@@ -430,6 +430,25 @@ def test_a_box_without_soils_is_told_with_the_faults_of_its_mesh(here, hytf):
         assert "soil: found an empty table" in err
 
 
+@pytest.mark.parametrize("sweep", ["direct", "reduced"])
+def test_motion_beyond_bounds_stops_the_run(here, hytf, sweep):
+    Path("s.toml").write_text(SCENE.replace("amplitude = 1.0", "amplitude = 1e25"))
+    code, _, err = hytf("run", "s.toml", "--quiet", "--set", f"solver.sweep='{sweep}'")
+    assert code == 3
+    assert "lapse 0: found peaks of 4 cells out of bounds, the first: 0, 1, 2, 3" in err
+    assert not Path("s-result").exists()
+
+
+def test_points_that_are_thrown_out_stop_the_run(here, hytf):
+    text = SCENE.replace("amplitude = 1.0", "amplitude = 1e12").replace(
+        "samples = 32", "samples = 80"
+    )
+    Path("s.toml").write_text(text)
+    more = ("lapses={count=2,continuity='transient'}", "effects={gravity=true,convection=true}")
+    code, _, err = hytf("run", "s.toml", "--quiet", "--set", *more)
+    assert code == 3 and "16 points left the mesh" in err
+
+
 def test_a_motion_of_nothing_gives_a_result(here, hytf):
     Path("s.toml").write_text(SCENE.replace("amplitude = 1.0", "amplitude = 0.0"))
     code, _, err = hytf("run", "s.toml", "--quiet")

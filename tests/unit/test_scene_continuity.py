@@ -261,3 +261,9 @@ def test_a_march_of_too_many_steps_is_refused():
     assert fault.key == "effects.sliding.time_step"
     assert "100000 steps a lapse" in str(fault)
     assert not check(slope(sliding={"time_step": 1e-4}), ".")[1]
+
+
+def test_a_rest_of_too_many_samples_is_a_fault():
+    (fault,) = check(slope(sliding={"longest": 1e12}), ".")[1]
+    assert fault.key == "effects.sliding.longest"
+    assert "10000000 samples" in fault.expected
