@@ -54,7 +54,7 @@ def study_accuracy(request: RunRequest, comm: MPI.Comm, budget: float | None = N
     folder = at_root(comm, lambda: open_result(request.folder, request.force))
     assert folder is not None  # this is the only rank
     try:
-        with _show(request.quiet) as progress:
+        with show_progress(request.quiet) as progress:
             study = at_root(comm, lambda: _conduct(request, scene, cell_type, budget, progress))
         assert study is not None
         at_root(comm, lambda: _write(request.folder, study))
@@ -153,8 +153,13 @@ def closing_words(study: Study, folder: Path) -> str:
 
 
 @contextmanager
-def _show(quiet: bool, stream: TextIO | None = None) -> Iterator[StudyCallback | None]:
-    """What to hand to :func:`conduct`: a bar on a terminal, plain lines elsewhere."""
+def show_progress(quiet: bool, stream: TextIO | None = None) -> Iterator[StudyCallback | None]:
+    """What to hand to a study: a bar on a terminal, plain lines elsewhere.
+
+    Args:
+        quiet: Nothing at all.
+        stream: Where to; standard error if ``None``.
+    """
     target = sys.stderr if stream is None else stream
     if quiet or target is None:  # closed before the program began
         yield None

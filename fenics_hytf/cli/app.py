@@ -290,12 +290,24 @@ def accuracy(
     quiet: QuietOption = False,
 ) -> None:
     """What accuracy costs: error against cost of a scene over its settings."""
-    if _is_launched():
-        tell(["accuracy: found mpirun; expected to be run without: it starts its runs itself"])
-        raise typer.Exit(INPUT)
+    _refuse_mpirun("accuracy")
     folder = output if output is not None else Path(f"{scene.stem}-accuracy")
     request = RunRequest(scene, folder, motion, tuple(overrides or ()), force, quiet)
     _leave("accuracy", request, budget=budget)
+
+
+@app.command()
+def stability(
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder  [./stability]"),
+    ] = Path("stability"),
+    force: Annotated[bool, typer.Option("--force", help="Replace maps that are there.")] = False,
+    quiet: QuietOption = False,
+) -> None:
+    """Where the method converges, drifts or blows up: its stability maps."""
+    _refuse_mpirun("stability")
+    _leave("stability", RunRequest(Path(), output, force=force, quiet=quiet))
 
 
 def default_folder(scene: Path) -> Path:
@@ -303,9 +315,12 @@ def default_folder(scene: Path) -> Path:
     return Path(f"{scene.stem}-result")
 
 
-def _is_launched() -> bool:
-    """Whether mpirun has started this process, be it on one rank."""
-    return any(re.fullmatch(r"(OMPI_COMM_WORLD|PMIX|PMI)_RANK", name) for name in os.environ)
+def _refuse_mpirun(command: str) -> None:
+    """End a study that mpirun has started, be it on one rank."""
+    if any(re.fullmatch(r"(OMPI_COMM_WORLD|PMIX|PMI)_RANK", name) for name in os.environ):
+        why = {"accuracy": "it starts its runs itself", "stability": "its runs are small"}[command]
+        tell([f"{command}: found mpirun; expected to be run without: {why}"])
+        raise typer.Exit(INPUT)
 
 
 def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
@@ -318,10 +333,11 @@ def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
         if faults:
             tell(faults)
             raise typer.Exit(INPUT)
-        from fenics_hytf.cli import accuracy, check, run
+        from fenics_hytf.cli import accuracy, check, run, stability
     commands: dict[str, Any] = {
         "run": run.run_scene,
         "check": check.check_scene,
         "accuracy": accuracy.study_accuracy,
+        "stability": stability.map_stability,
     }
     raise typer.Exit(run.guarded(partial(commands[command], **options), request))

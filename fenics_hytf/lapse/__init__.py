@@ -36,7 +36,7 @@ from fenics_hytf.lapse.records import (
 )
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
 from fenics_hytf.lapse.run import Observer, Solved, solve
-from fenics_hytf.lapse.scheme import Scheme, scheme_of
+from fenics_hytf.lapse.scheme import HANDOVER, Scheme, scheme_of
 from fenics_hytf.lapse.sliding import Sliding
 from fenics_hytf.lapse.slipped import Slipped, SlipState
 from fenics_hytf.lapse.slope import Slope
@@ -45,6 +45,7 @@ from fenics_hytf.lapse.statics import Statics
 from fenics_hytf.lapse.unknowns import Unknowns
 
 __all__ = [
+    "HANDOVER",
     "Anderson",
     "BalanceError",
     "BaseProbe",

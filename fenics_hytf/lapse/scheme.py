@@ -15,9 +15,12 @@ from fenics_hytf.motion import Contour
 from fenics_hytf.scene import Scene
 from fenics_hytf.soil import RELAXATION_TIMES
 
-# T_p over the lapse, and ηT_p. With 4 and 9.2 forty lapses of an elastic column were 1.3e-3 off in
-# displacement, of a lightly damped one 8e-4; with these, 4e-5 and 9e-6. ηT is the same, 2.3.
-_HANDOVER = (6, 13.8)
+HANDOVER = (6, 13.8)
+"""T_p over the lapse, and ηT_p.
+
+With 4 and 9.2 forty lapses of an elastic column were 1.3e-3 off in displacement, of a lightly
+damped one 8e-4; with these, 4e-5 and 9e-6. ηT is the same, 2.3.
+"""
 _WHOLE_RECORD = (4, 9.2)  # T_p over the record, and ηT_p
 
 
@@ -88,7 +91,7 @@ def scheme_of(scene: Scene, region_names: Collection[str]) -> Scheme:
     maxwell, damped = scene.solver.complex_modulus == "maxwell", _is_damped(scene, region_names)
     length, dt = scene.segments[0].num_samples, scene.dt
     if maxwell or not damped or len(scene.segments) == 1:
-        return Scheme("handover", Contour.over(length, dt, *_HANDOVER), maxwell and damped)
+        return Scheme("handover", Contour.over(length, dt, *HANDOVER), maxwell and damped)
     total = scene.base_acceleration.shape[1]
     return Scheme("whole_record", Contour.over(total, dt, *_WHOLE_RECORD))
 

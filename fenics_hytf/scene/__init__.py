@@ -7,7 +7,7 @@ each with its key, what was found and what was expected. How anything is solved 
 
 from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
-from fenics_hytf.scene.continuity import short_lapses
+from fenics_hytf.scene.continuity import ABOVE_BAND, PERIODS, motion_band, short_lapses
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
 from fenics_hytf.scene.mesh import MOST_CELLS, Box, Column, Layer, Mesh, components_of
@@ -33,7 +33,9 @@ from fenics_hytf.scene.settings import (
 from fenics_hytf.scene.soil import Soil
 
 __all__ = [
+    "ABOVE_BAND",
     "MOST_CELLS",
+    "PERIODS",
     "Boundary",
     "Box",
     "Calm",
@@ -66,6 +68,7 @@ __all__ = [
     "direction_fault",
     "examine",
     "identity",
+    "motion_band",
     "rule_degrees",
     "short_lapses",
 ]

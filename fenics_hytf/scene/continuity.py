@@ -21,8 +21,10 @@ from fenics_hytf.scene.motion import MotionInput
 from fenics_hytf.scene.settings import Effects, Lapses, Sliding, Solver
 from fenics_hytf.scene.table import as_list
 
-_ABOVE_BAND = 2.0  # f_max over the frequency below which 99 % of the energy lies
-_PERIODS = 10.0  # f_max times the length of a lapse
+ABOVE_BAND = 2.0
+"""Least highest frequency over that below which 99 % of the motion's energy lies [-]."""
+PERIODS = 10.0
+"""Least highest frequency times the length of a lapse [-]."""
 _MOST_REST = 10_000_000  # samples after the motion: 80 MB of zeros for each
 _MOST_STEPS = 100_000  # of the march in a lapse: its time goes with their square, here some 10 s
 
@@ -139,17 +141,17 @@ def continuity_rules(
     if cut is None or cut >= nyquist * (1 - 1e-9):
         return
     found = toml_text(cut)
-    band = _ABOVE_BAND * energy_band(_padded(motions), dt)
+    band = ABOVE_BAND * motion_band(motions)
     if cut < band:
         expected = (
             f"at least {band:.3g} Hz, twice the frequency below which the motion has 99 % of its "
             "energy, or none: with less, transient lapses drift apart"
         )
         yield Fault("solver.max_frequency", found, expected)
-    if cut * duration < _PERIODS:
+    if cut * duration < PERIODS:
         expected = (
-            f"at least {_PERIODS / duration:.3g} Hz with lapses of {duration:g} s (frequency times "
-            f"length from {_PERIODS:g}), or none, or longer lapses: shorter ones blow up"
+            f"at least {PERIODS / duration:.3g} Hz with lapses of {duration:g} s (frequency times "
+            f"length from {PERIODS:g}), or none, or longer lapses: shorter ones blow up"
         )
         yield Fault("solver.max_frequency", found, expected)
 
@@ -165,7 +167,7 @@ def short_lapses(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault
     Yields:
         The fault.
     """
-    least = 2 * round(_PERIODS)  # f_max at the Nyquist frequency
+    least = 2 * round(PERIODS)  # f_max at the Nyquist frequency
     if count > 1 and lapses.continuity == "transient" and num_samples < least:
         name = "count" if lapses.duration is None else "duration"
         found = f"{toml_text(getattr(lapses, name))}, lapses of {num_samples} samples"
@@ -176,6 +178,11 @@ def short_lapses(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault
 def _names(raw: dict[str, Any], section: str, key: str) -> bool:
     table = raw.get(section)
     return isinstance(table, dict) and key in table
+
+
+def motion_band(motions: tuple[MotionInput, ...]) -> float:
+    """Frequency below which motions have 99 % of their energy [Hz]."""
+    return energy_band(_padded(motions), motions[0].record.dt)
 
 
 def _padded(motions: tuple[MotionInput, ...]) -> npt.NDArray[np.float64]:

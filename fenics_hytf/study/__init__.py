@@ -14,13 +14,17 @@ from fenics_hytf.study.records import (
     StudyProgress,
 )
 from fenics_hytf.study.runs import Processes
+from fenics_hytf.study.stability import Axes, StabilityRun, conduct_stability
 
 __all__ = [
+    "Axes",
     "BudgetSpent",
     "Processes",
+    "StabilityRun",
     "Study",
     "StudyCallback",
     "StudyError",
     "StudyProgress",
     "conduct",
+    "conduct_stability",
 ]

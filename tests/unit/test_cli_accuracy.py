@@ -181,7 +181,7 @@ def test_progress_on_a_terminal():
             return True
 
     stream = Terminal()
-    with accuracy._show(False, stream) as callback:
+    with accuracy.show_progress(False, stream) as callback:
         callback(StudyProgress(6, 12, "cells ×2"))
     assert "run 7 of about 12" in stream.getvalue() and "cells ×2" in stream.getvalue()
 
