@@ -136,11 +136,12 @@ def frequency_map(runs: Sequence[StabilityRun]) -> Figure:
         _logarithmic(axes.xaxis, {_number(r, "periods") for r in here})
         _logarithmic(axes.yaxis, {_number(r, "above_band") for r in here})
         _leave_room(axes)
+        axes.axhline(margins.NEAR_BAND, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
         axes.axhspan(axes.get_ylim()[0], ABOVE_BAND * 0.97, color=QUIET, alpha=0.13, lw=0)
         axes.set_title(f"damping {100 * damping:g} %, {_fate('falls', -less)}", fontsize=9)
         axes.set_xlabel("Lapse × highest frequency [-]")
         if axes.get_subplotspec().is_first_col():
-            axes.set_ylabel("Highest frequency over the motion's band [-]")
+            axes.set_ylabel("Highest frequency over band [-]")
     text = (
         f"A column in lapses at the ηT of a run, {DEFAULT_DECAY:g}\nthe topmost row has all lines "
         "that samples hold, as a scene without solver.max_frequency"
@@ -150,22 +151,25 @@ def frequency_map(runs: Sequence[StabilityRun]) -> Figure:
 
 def block_map(runs: Sequence[StabilityRun]) -> Figure:
     """Fill × frequency with the ghost term and without, and the condition number of both."""
-    figure = Figure(figsize=(13.0, 5.2))
+    figure = Figure(figsize=(13.0, 5.4))
     panels = figure.subplots(1, 3)
+    fills = sorted({_number(r, "fill") for r in runs}, reverse=True)
     for axes, ghost in zip(panels, ("yes", "no"), strict=False):
         here = _of(runs, ghost=ghost)
-        _scatter(axes, here, lambda r: (_number(r, "fill"), _number(r, "waves")))
+        _scatter(axes, here, lambda r: (fills.index(_number(r, "fill")), _number(r, "waves")))
         axes.set_title("with the ghost term, as runs have it" if ghost == "yes" else "without it")
         axes.axhline(margins.NEAR_WAVES, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
         _logarithmic(axes.yaxis, {_number(r, "waves") for r in here})
         _leave_room(axes)
+        axes.set_xlim(-0.6, len(fills) - 0.4)
+        axes.set_xticks(range(len(fills)), [f"{100 * fill:g}" for fill in fills], rotation=45)
         axes.invert_yaxis()
-        axes.set_ylabel("Cells a shear wave's length [-]  (frequency rises upwards)")
+        axes.set_xlabel("Share of the last cells that is filled [%]")
         _conditions(panels[2], here, ghost == "yes")
-    for axes in panels:
-        axes.set_xscale("log")
-        axes.invert_xaxis()
-        axes.set_xlabel("Share of the last cells that is filled [-]")
+    panels[0].set_ylabel("Cells in a shear wave's length [-]; frequency upwards")
+    panels[2].set_xscale("log")
+    panels[2].invert_xaxis()
+    panels[2].set_xlabel("Share of the last cells that is filled [-]")
     panels[2].set_yscale("log")
     panels[2].axhline(SINGULAR, color=INK, linewidth=0.9, linestyle=DASHED)
     panels[2].annotate(
@@ -304,12 +308,13 @@ def _logarithmic(axis, values: Iterable[float]) -> None:  # type: ignore[no-unty
 
 
 def _leave_room(axes: Axes) -> None:
-    """Limits a little beyond the marks, whatever lines are drawn."""
+    """Limits a little beyond the marks of logarithmic axes, whatever lines are drawn."""
     points = np.concatenate(
         [line.get_xydata() for line in axes.lines if line.get_marker() != "None"]
     )
     (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
-    axes.set_xlim(x0 / 1.25, x1 * 1.25)
+    if x0 > 0:
+        axes.set_xlim(x0 / 1.25, x1 * 1.25)
     axes.set_ylim(y0 / 1.25, y1 * 1.25)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Stability maps: how runs are judged, what they are held against, and what the kept maps bear out."""
+"""Stability maps: how runs are judged, what against, and what the kept maps bear out."""
 
 from __future__ import annotations
 
@@ -351,4 +351,3 @@ def test_contrasts_short_of_the_warning_are_solved_by_every_sweep(kept, figure):
 def test_no_sweep_calls_a_wrong_solution_good(kept):
     """Where contrast is too much runs stop, and say so."""
     assert {r.verdict for r in of(kept, CONTRAST)} == {Verdict.CONVERGES, Verdict.STOPS}
-
