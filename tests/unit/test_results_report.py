@@ -203,6 +203,16 @@ def test_the_report_tells_seams_and_energy(tmp_path):
     assert "Degradation index [-]" in text and " 0.960 " in text
 
 
+@pytest.mark.parametrize(("share", "told"), [(0.5, False), (2.0, True)])
+def test_moduli_that_bring_more_energy_than_the_shaking_stand_out(share, told, tmp_path):
+    result = make_result(lapses=3)
+    come = sum(lapse.energy.input for lapse in result.lapses)
+    last = result.lapses[2]
+    pumped = replace(last, energy=replace(last.energy, seam=share * come))
+    text = text_of(replace(result, lapses=(*result.lapses[:2], pumped)), tmp_path / "r")
+    assert ("pump the ground up" in text) == told
+
+
 @pytest.mark.parametrize("case", [{}, {"lapses": 3, "continuity": "steady"}], ids=str)
 def test_without_a_seam_or_energy_there_is_no_section_on_them(tmp_path, case):
     assert "Seams and energy" not in text_of(make_result(**case), tmp_path / "r")

@@ -288,7 +288,7 @@ def test_the_default_contour_lies_well_inside(kept, figure):
     assert len({r.axes["decay"] for r in near}) == 3
     assert {r.verdict for r in near} == {Verdict.CONVERGES}
     own = [r for r in near if r.axes["decay"] == DEFAULT_DECAY]
-    figure("kept map, default contour, safe lapses: displacement", worst(own), SMALL / 10)
+    figure("kept map, default contour, safe lapses: displacement", worst(own), SMALL / 5)
     beyond = [r for r in of(kept, LAPSES) if float(r.axes["decay"]) >= 2 * DEFAULT_DECAY]
     assert Verdict.BLOWS_UP in {r.verdict for r in beyond}
     assert HANDOVER[1] / HANDOVER[0] == pytest.approx(DEFAULT_DECAY)
@@ -317,7 +317,7 @@ def test_maximum_frequencies_within_the_rule_converge(kept, figure):
         if float(r.axes["periods"]) >= margins.NEAR_PERIODS
         and float(r.axes["above_band"]) >= margins.NEAR_BAND
     ]
-    figure("kept map, safe maximum frequencies: displacement", worst(safe), SMALL / 10)
+    figure("kept map, safe maximum frequencies: displacement", worst(safe), SMALL / 5)
 
 
 def test_cut_cells_with_a_ghost_term_are_sound_at_any_fill(kept, figure):

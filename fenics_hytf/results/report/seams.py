@@ -50,6 +50,12 @@ def _words(summary: Summary) -> Iterator[str]:
             f", {_share(energy, 'rest')} went into stress that faded after the moduli had changed, "
             f"and jumps at the seams brought {_share(energy, 'seam')}"
         )
+        if energy["seam"] - energy["rest"] > abs(energy["input"]):
+            text += (
+                ". That moduli changed from lapse to lapse has brought more energy than the "
+                "shaking: moduli that swing so far pump the ground up, beyond the edge of the "
+                "stability map, demos/stability_lapses.png. Compare with fewer, longer lapses"
+            )
     worst = energy["worst_imbalance"]
     balanced = NOTHING if worst is None else power(worst)
     yield f"{text}. The balance of no lapse is off by more than {balanced} of the input."
