@@ -37,6 +37,7 @@ from fenics_hytf.study.stability_table import counted
 from fenics_hytf.study.stability_verdicts import (
     GROWTH,
     LARGEST,
+    PUMPED,
     SINGULAR,
     SMALL,
     SMALL_ENERGY,
@@ -115,8 +116,9 @@ def lapse_map(runs: Sequence[StabilityRun]) -> Figure:
         axes.set_xlabel("Lapse × highest frequency [-]")
     verdict = (
         f"converges: displacement within {100 * SMALL:g} % of the true peak, energy within "
-        f"{100 * SMALL_ENERGY:g} %\nblows up: {LARGEST:g} times as large as true or as with "
-        f"moduli held, or {GROWTH:g} times as large at the end of still time as at its start"
+        f"{100 * SMALL_ENERGY:g} %\nblows up: {LARGEST:g} times as large as true, growing "
+        f"{GROWTH:g}-fold in still time, or with {PUMPED:g} times the energy from changes of moduli as from "
+        "the base"
     )
     text = f"A column in lapses, cut at twice the band of its motion\n{verdict}"
     lines = f"shaded: refused; {_DOT}; dashed: ηT of a run"
@@ -262,7 +264,7 @@ def _residuals(axes: Axes, runs: Sequence[StabilityRun], places: Sequence[str]) 
     axes.set_yscale("log")
     axes.set_ylabel("Residual of true solutions in doubles [-]")
     axes.set_title("what no sweep can beat")
-    axes.legend(loc="center right")
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.78))
 
 
 def _scatter(axes: Axes, runs: Sequence[StabilityRun], where: _Where) -> None:

@@ -56,26 +56,6 @@ def true_motion(case: ColumnCase) -> RealArray:
     return np.asarray(rows @ np.array(states).T)
 
 
-def held_peak(case: ColumnCase, count: int = 7) -> float:
-    """The largest displacement of columns whose moduli are held.
-
-    Args:
-        case: The column.
-        count: How many ratios are tried, from the fraction to 1 by equal factors.
-
-    Returns:
-        The peak [m].
-    """
-    column, rows = _Column.of(case)
-    record, size, peak = _taylor(case), column.size, 0.0
-    for ratio in np.geomspace(case.fraction, 1.0, count if case.fraction < 1 else 1):
-        flow, state = expm(case.scene.dt * column.rates(ratio)), np.zeros(size)
-        for sample in range(record.shape[1]):
-            peak = max(peak, float(np.abs(rows @ state[column.u]).max()))
-            state = flow[:size, :size] @ state + flow[:size, size:] @ record[:, sample]
-    return peak
-
-
 def _taylor(case: ColumnCase) -> RealArray:
     """The record that lapses see, and its derivatives from the right at every sample."""
     scene = case.scene

@@ -40,8 +40,8 @@ _AXES = {  # name in a run: column
 _FIGURES = {
     "error": "error",
     "amplitude": "amplitude_over_true",
-    "gain": "amplitude_over_held",
     "growth": "growth_over_true",
+    "pumped": "energy_of_changes",
     "imbalance": "energy_imbalance",
     "condition": "condition",
     "residual": "residual",
