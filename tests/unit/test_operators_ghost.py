@@ -75,6 +75,29 @@ def test_a_linear_displacement_feels_nothing(cell, degree, figure):
     assert energy > 0  # the wave does feel it
 
 
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_parabola_feels_nothing_at_degree_two(cell):
+    domain = box(cell, 2, comm=SELF, shift=0.0)
+    K, gdim = ghost(domain), domain.gdim
+    bend = np.random.default_rng(2).normal(size=(gdim, gdim, gdim))
+    force, _ = image(domain, K, lambda x: np.einsum("ni,nj,ijk->nk", x, x, bend))
+    bent, _ = image(domain, K, waves(gdim))
+    assert np.abs(force).max() < EXACT * np.abs(bent).max()
+
+
+@pytest.mark.parametrize("cell", CELLS)
+def test_a_jump_of_curvature_is_held_at_degree_two(cell):
+    """u = max(x − 1.5, 0)²/2 bends on one side of the middle: a_K Ē h³/20 times the area of it."""
+    domain = box(cell, 2, (2, 1, 1), comm=SELF, shift=0.0)
+    along = np.eye(domain.gdim)[0]
+    energy = image(
+        domain, ghost(domain), lambda x: np.outer(np.maximum(x[:, 0] - 1.5, 0) ** 2 / 2, along)
+    )[1]
+    depth = {"triangle": 0.75, "tetrahedron": 0.5}.get(cell, 1.5)  # volume over area of the facet
+    area = 2.0 ** (domain.gdim - 1)
+    assert energy == pytest.approx(STRENGTH[domain.gdim] * E * depth**3 / 20 * area, rel=1e-12)
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("antiplane", [False, True])
 @pytest.mark.parametrize("cell", CELLS[:2])
