@@ -8,7 +8,7 @@ from fenics_hytf.lapse.continuity import Continuity, excite
 from fenics_hytf.lapse.convective import cell_stress, convect
 from fenics_hytf.lapse.cycles import CycleCount
 from fenics_hytf.lapse.energy import Energy
-from fenics_hytf.lapse.equations import Equations
+from fenics_hytf.lapse.equations import Equations, LapseEquations
 from fenics_hytf.lapse.equivalent_linear import Anderson, first_strain, iterate
 from fenics_hytf.lapse.errors import (
     BalanceError,
@@ -69,6 +69,7 @@ __all__ = [
     "Ground",
     "Handover",
     "Histories",
+    "LapseEquations",
     "LapseError",
     "LapseResult",
     "Material",
