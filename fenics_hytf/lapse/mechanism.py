@@ -86,7 +86,6 @@ class Mechanism:
             [-]; negative where the slope does not stand at rest.
         field: φ at this rank's nodes, ghosts included, the longest displacement of all ranks 1 [-],
             shape ``(num_local_nodes, num_components)``.
-        unknowns: The same in the unknowns q of u = T q, shape ``(num_local_unknowns,)``.
         dissipation: ∫ τ_f γ(φ) dV [N, in 2D N/m].
         driving: f_h·φ [N, in 2D N/m].
         iterations: Flows, with the one that the search began with.
@@ -96,7 +95,6 @@ class Mechanism:
 
     yield_coefficient: float
     field: RealArray
-    unknowns: RealArray
     dissipation: float
     driving: float
     iterations: int
@@ -256,7 +254,6 @@ class _Search:
         return Mechanism(
             yield_coefficient=functional[-1] + compression,
             field=np.asarray(nodal / longest),
-            unknowns=np.asarray(flow / longest),
             dissipation=shear / longest,
             driving=1 / longest,
             iterations=len(functional),
