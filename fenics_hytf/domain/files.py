@@ -4,6 +4,9 @@
 Physical groups (gmsh), sets (Abaqus ...) or families (MED) of the mesh's dimension are regions and
 carry the names of soils; those one dimension lower are boundaries. A file that names no boundary
 has those of a box: the sides of the box around the mesh.
+
+A mesh is read as numbers, never run: scripts of gmsh (``.geo``) are refused. Formats that keep
+their numbers in other files (XDMF, links of HDF5) are followed to where they lead.
 """
 
 from __future__ import annotations

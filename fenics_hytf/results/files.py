@@ -26,7 +26,7 @@ def replacing(path: Path) -> Iterator[Path]:
     Raises:
         OSError: It cannot be written; it names the file, as a full disk does not by itself.
     """
-    part = path.with_name(f".{path.name}")
+    part = part_of(path)
     try:
         part.unlink(missing_ok=True)
         os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -41,6 +41,11 @@ def replacing(path: Path) -> Iterator[Path]:
     except BaseException:
         _discard(part)
         raise
+
+
+def part_of(path: Path) -> Path:
+    """Where a file stands until it is whole; a run that is killed leaves it there."""
+    return path.with_name(f".{path.name}")
 
 
 def replace_file(path: Path, text: str) -> None:

@@ -22,7 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
-from fenics_hytf.results.files import replace_file
+from fenics_hytf.results.files import part_of, replace_file
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.results.summary import summarise
 from fenics_hytf.results.writers import write_tables
@@ -309,7 +309,7 @@ class ResultFolder:
 
     def _remove(self, patterns: Iterable[str]) -> None:
         for pattern in patterns:
-            for file in self.path.glob(pattern):
+            for file in (*self.path.glob(pattern), *self.path.glob(part_of(Path(pattern)).name)):
                 file.unlink()
         _remove_empty([self.checkpoint])
 

@@ -2,7 +2,8 @@
 """The tables of a result as CSV: histories, base, transfer functions, spectra, cells, slip.
 
 Numbers are written with the fewest digits that give back the same double. A number that does not
-exist (not finite) is an empty field. Rows are written in blocks; no file is ever a string.
+exist (not finite) is an empty field. Rows are written in blocks; no file is ever a string. Names of
+soils are written as the scene has them: one that begins with ``=`` is a formula to a spreadsheet.
 """
 
 from __future__ import annotations

@@ -498,6 +498,14 @@ def test_two_runs_to_one_folder_at_once(here, hytf):
     assert hytf(*RUN, "--quiet")[0] == 0
 
 
+def test_what_a_killed_run_has_half_written_goes(here, whole, hytf):
+    Path(FOLDER).mkdir()
+    for name in (".receivers.csv", ".profiles.png", ".report.html", ".points_0007.vtu"):
+        Path(FOLDER, name).write_text("half")
+    assert hytf(*RUN, "--quiet", "--resume")[0] == 0
+    assert same_files(whole, FOLDER) > 0
+
+
 def test_a_link_in_the_folder_is_replaced_not_written_through(here, hytf):
     """Naively a link that someone left is a way out of the folder."""
     Path(FOLDER, "checkpoint").mkdir(parents=True)

@@ -14,6 +14,7 @@ import json
 import resource
 import shutil
 import zipfile
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -21,7 +22,8 @@ import meshio
 import pytest
 
 from fenics_hytf.motion import RecordError, recorded
-from fenics_hytf.results import open_result, publish
+from fenics_hytf.results import open_result, publish, read_result
+from fenics_hytf.results.report.document import report
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import CheckpointError
 from fenics_hytf.simulation.checkpoint import (
@@ -34,6 +36,7 @@ from fenics_hytf.simulation.checkpoint import (
 from tests.unit.results_builder import make_result, make_scene
 
 EVIL = "<script>alert(1)</script>&\"'"
+FORMULA = "$x^{2$ \\frac{1 $ %s {0} \u202e"  # that matplotlib would trip over
 SCENE = """
 title = "A box"
 [mesh]
@@ -325,17 +328,16 @@ def poisoned(value: object, path: str = "") -> object:
 
 
 def test_no_text_of_a_scene_becomes_markup(tmp_path):
-    """Title, soils, curves, motion, boundaries: each with a script that waits to be one."""
+    """Title and soils, in tables and figures: with a script, and half a formula."""
     scene = make_scene(loop=True)
     data = json.loads(json.dumps(scene.data))
-    data["title"] = EVIL
-    soils = {f"{name}{EVIL}".replace('"', ""): soil for name, soil in data["soil"].items()}
+    data["title"] = f"{EVIL} {FORMULA}"
+    tail = f"{EVIL} {FORMULA}".replace('"', "")
+    soils = {f"{name}{tail}": soil for name, soil in data["soil"].items()}
     data["soil"] = soils
     names = list(soils)
     for layer, name in zip(data["mesh"]["column"]["layers"], names, strict=True):
         layer["soil"] = name
-    from dataclasses import replace
-
     result = make_result(loop=True)
     result = replace(result, scene=type(scene).from_dict(data), region_names=tuple(names))
     with open_result(tmp_path / "r") as folder:
@@ -351,9 +353,6 @@ TEXTS = ["title", "warnings", "motions", "scene", "versions", "written", "effect
 @pytest.mark.parametrize("part", TEXTS)
 def test_no_text_of_a_summary_becomes_markup(tmp_path, part):
     """What a result from elsewhere says, wherever it says it: the page has the same elements."""
-    from fenics_hytf.results.reader import read_result
-    from fenics_hytf.results.report.document import report
-
     with open_result(tmp_path / "r") as folder:
         folder.write(make_result(kind="box", compliant=True))
     stored = read_result(tmp_path / "r")
