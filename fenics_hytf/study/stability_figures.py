@@ -117,8 +117,8 @@ def lapse_map(runs: Sequence[StabilityRun]) -> Figure:
     verdict = (
         f"converges: displacement within {100 * SMALL:g} % of the true peak, energy within "
         f"{100 * SMALL_ENERGY:g} %\nblows up: {LARGEST:g} times as large as true, growing "
-        f"{GROWTH:g}-fold in still time, or with {PUMPED:g} times the energy from changes of "
-        "moduli as from the base"
+        f"{GROWTH:g}-fold in still time, or with {PUMPED:g} times the input's energy from "
+        "changes of moduli"
     )
     text = f"A column in lapses, cut at twice the band of its motion\n{verdict}"
     lines = f"shaded: refused; {_DOT}; dashed: ηT of a run"

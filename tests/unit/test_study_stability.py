@@ -30,6 +30,7 @@ from fenics_hytf.study.stability_table import TABLE, read_runs, summary, write_r
 from fenics_hytf.study.stability_verdicts import (
     SINGULAR,
     SMALL,
+    SMALL_RESPONSE,
     Verdict,
     judge_history,
     judge_response,
@@ -323,9 +324,14 @@ def test_cut_cells_with_a_ghost_term_are_sound_at_any_fill(kept, figure):
     held = of(kept, BLOCK, ghost="yes")
     figure("kept map, cut cells with ghost: condition", worst(held, "condition"), 1e4)
     assert Verdict.BLOWS_UP not in {r.verdict for r in held}
+    # At its own resonance, 50 cells a wave, the block in whole cells is off by a little more.
+    whole = {r.axes["waves"]: float(r.figures["error"] or 0.0) for r in held if r.axes["fill"] == 1}
     safe = [r for r in held if float(r.axes["waves"]) >= margins.NEAR_WAVES]
-    bad = [r for r in safe if r.verdict != Verdict.CONVERGES and r.axes["fill"] != 1.0]
-    assert not bad
+    excess = max(float(r.figures["error"] or 0) - whole[r.axes["waves"]] for r in safe)
+    figure("kept map, cut cells: error over that of whole ones", excess, 0.05)
+    assert {r.verdict for r in safe if whole[r.axes["waves"]] <= SMALL_RESPONSE} == {
+        Verdict.CONVERGES
+    }
     assert Verdict.BLOWS_UP in {r.verdict for r in of(kept, BLOCK, ghost="no")}
 
 
