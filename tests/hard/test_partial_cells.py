@@ -50,6 +50,19 @@ def lifted(to: np.ndarray) -> Callable:
     return step
 
 
+def with_a_whole_cell(side: int, dim: int, degree: int = 1) -> Ground:
+    """A block with a whole cell on its corner, where others have a point."""
+    inside = in_block(side, side)
+
+    def keep(x: np.ndarray) -> np.ndarray:
+        above = (x[:, :-1] > AIR + side - 1) & (x[:, :-1] < AIR + side)
+        return inside(x) | (above.all(axis=1) & (x[:, -1] > side))
+
+    whole = Ground(section(side, side + 1, dim, soil=DAMPED, degree=degree), keep)
+    assert not whole.filling.loose.any()
+    return whole
+
+
 @pytest.mark.parametrize("place", PLACES, ids=str)
 @pytest.mark.parametrize("dim", [2, 3])
 def test_09_one_point_in_a_cell_that_shares_a_side(dim, place, figure):
@@ -68,14 +81,7 @@ def test_09_one_point_in_a_cell_that_shares_a_side(dim, place, figure):
     figure("a side: zero modes", zero_modes(ground.K), 0)
     figure("a side: cond₁ of A at rest", condition(ground.K, 1), 2e3)
     # At a resonance of ground damped by 5 % whole cells themselves have some 5e3.
-    taller = section(side, side + 1, dim, soil=DAMPED)
-
-    def with_a_whole_cell(x):
-        above = (x[:, :-1] > AIR + side - 1) & (x[:, :-1] < AIR + side)
-        return inside(x) | (above.all(axis=1) & (x[:, -1] > side))
-
-    whole = Ground(taller, with_a_whole_cell)
-    assert not whole.filling.loose.any()
+    whole = with_a_whole_cell(side, dim)
     band = BAND[:: 1 if dim == 2 else 5]
     worst = max(condition(ground.A(w), 1) for w in band)
     usual = max(condition(whole.A(w), 1) for w in band)
@@ -84,6 +90,23 @@ def test_09_one_point_in_a_cell_that_shares_a_side(dim, place, figure):
         figure("whole cells at a resonance: cond₁ of A", usual, 2e3, at_least=True)
     largest, usual = (max(np.abs(g.nodal(w)).max() for w in band) for g in (ground, whole))
     figure("a side: |u| over that of whole cells", largest / usual, 2)
+
+
+@pytest.mark.parametrize(("dim", "place"), [*((2, place) for place in PLACES), (3, PLACES[3])])
+def test_09_one_point_in_a_cell_of_degree_two(dim, place, figure):
+    """Held by first normal derivatives alone it kept 3 zero modes in a section and 21 in space."""
+    side = 2
+    case, inside = section(side, side, dim, soil=DAMPED, degree=2), in_block(side, side)
+    to = np.full(dim, AIR + side - 1 + place[0])
+    to[-1] = side + place[1]
+    ground, whole = Ground(case, inside, lifted(to)), with_a_whole_cell(side, dim, degree=2)
+    figure("degree 2: zero modes", zero_modes(ground.K), 0)
+    # Carried on by a cell, a parabola through three nodes weighs them by 3, 8 and 6.
+    growth = condition(ground.K, 1) / condition(whole.K, 1)
+    figure("degree 2: cond₁ of A at rest over that of whole cells", growth, 17**2)
+    band = BAND[:: 4 if dim == 2 else 50]
+    largest, usual = (max(np.abs(g.nodal(w)).max() for w in band) for g in (ground, whole))
+    figure("degree 2: |u| over that of whole cells", largest / usual, 2)
 
 
 @pytest.mark.parametrize("dim", [2, 3])

@@ -55,7 +55,13 @@ def as_kind(filling: Filling, kind: type[Filling], **options) -> Filling:
 
 
 def section(
-    wide: int, high: int, dim: int = 2, size: float = 1.0, soil: dict | None = None, **sections
+    wide: int,
+    high: int,
+    dim: int = 2,
+    size: float = 1.0,
+    soil: dict | None = None,
+    degree: int = 1,
+    **sections,
 ):
     """A scene of soil, some cells high, with room for a block some cells wide in its middle.
 
@@ -65,6 +71,7 @@ def section(
         dim: Dimensions.
         size: Of a cell [m].
         soil: What differs from the usual one.
+        degree: Of displacement.
         sections: Of the scene.
     """
     cells = [wide + 2 * AIR] * (dim - 1) + [high + AIR]
@@ -72,6 +79,7 @@ def section(
         "box": {"size": [n * size for n in cells], "cells": cells},
         "regions": [{"soil": "clay", "below": high * size}, {"soil": "air"}],
         "empty": ["air"],
+        "degree": degree,
     }
     usual = {"effects": {"convection": True}}
     return scene(mesh, soil={"clay": SOFT | (soil or {})}, **(usual | sections))
