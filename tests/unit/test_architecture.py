@@ -25,9 +25,18 @@ VERSION_DEPENDENT = re.compile(
 )
 
 
+def place_of(path: Path) -> str:
+    return str(path.relative_to(TOP))
+
+
+@cache
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
 @cache
 def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return ast.parse(text_of(path))
 
 
 def nodes(*kinds: type[ast.AST]) -> Iterator[tuple[str, Any]]:
@@ -35,7 +44,7 @@ def nodes(*kinds: type[ast.AST]) -> Iterator[tuple[str, Any]]:
     for path in MODULES:
         for node in ast.walk(tree_of(path)):
             if isinstance(node, kinds):
-                yield f"{path.relative_to(TOP)}:{getattr(node, 'lineno', 1)}", node
+                yield f"{place_of(path)}:{getattr(node, 'lineno', 1)}", node
 
 
 def imports() -> Iterator[tuple[str, str]]:
@@ -71,7 +80,7 @@ def test_a_room_takes_only_from_rooms_below_it() -> None:
 
 
 def test_no_two_modules_need_each_other() -> None:
-    names = {str(path.relative_to(TOP)): module_name(path) for path in MODULES}
+    names = {place_of(path): module_name(path) for path in MODULES}
     needs: dict[str, set[str]] = {name: set() for name in names.values() if name != "fenics_hytf"}
     for place, name in imports():
         module = names[place.partition(":")[0]]
@@ -110,26 +119,22 @@ def test_only_the_command_line_knows_the_terminal() -> None:
 
 
 def test_names_that_change_with_dolfinx_stand_in_one_module() -> None:
-    texts = {path.name: path.read_text(encoding="utf-8") for path in MODULES}
-    assert [name for name, text in texts.items() if VERSION_DEPENDENT.search(text)] == [
-        "_compat.py"
-    ]
+    told = [place_of(path) for path in MODULES if VERSION_DEPENDENT.search(text_of(path))]
+    assert told == ["_compat.py"]
 
 
 def test_a_module_says_its_licence_and_what_it_is_for() -> None:
     faults = [
-        str(path.relative_to(TOP))
+        place_of(path)
         for path in MODULES
-        if not path.read_text(encoding="utf-8").startswith("# SPDX-License-Identifier: MIT\n")
+        if not text_of(path).startswith("# SPDX-License-Identifier: MIT\n")
         or not ast.get_docstring(tree_of(path))
     ]
     assert not faults
 
 
 def test_a_module_can_be_read_through_in_one_go() -> None:
-    lengths = {
-        str(path.relative_to(TOP)): path.read_text(encoding="utf-8").count("\n") for path in MODULES
-    }
+    lengths = {place_of(path): text_of(path).count("\n") for path in MODULES}
     assert {name: lines for name, lines in lengths.items() if lines > LONGEST} == {}
 
 
