@@ -20,6 +20,7 @@ from fenics_hytf.scene import Fault, SceneError, default_kind
 
 # Sides that tie to each other, and the axis across which they do.
 _TIED = (("left", "right", 0), ("front", "back", 1))
+_ALIKE = 1e-8  # of the length of a side: nodes that are not farther apart face each other
 
 
 def constraint_matrix(
@@ -144,8 +145,12 @@ def _tied_nodes(domain: Domain, kinds: Mapping[str, str]) -> dict[int, int]:
             raise SceneError([Fault(f"boundary.{high}", found, expected)])
         image.update(zip(high_number.tolist(), low_number[partner].tolist(), strict=True))
     for node, target in image.items():
-        while target in image:  # an edge between two tied pairs
-            target = image[target]
+        for _ in _TIED:
+            target = image.get(target, target)  # an edge between two tied pairs
+        if target in image:
+            found = "nodes that are tied to themselves in the end"
+            expected = f"sides farther apart than {_ALIKE:g} of their length"
+            raise SceneError([Fault("boundary", f"{found} (first: node {node})", expected)])
         image[node] = target
     return image
 
@@ -157,7 +162,7 @@ def _match(
     if not len(low) or not len(high):
         return np.empty(0, np.int64), np.arange(len(high))
     distance, partner = KDTree(low).query(high)
-    tolerance = 1e-8 * max(float(np.ptp(low, axis=0).max()), np.finfo(float).tiny)
+    tolerance = _ALIKE * max(float(np.ptp(low, axis=0).max()), np.finfo(float).tiny)
     return partner, np.flatnonzero(distance > tolerance)
 
 

@@ -257,6 +257,14 @@ def test_tied_sides_that_face_but_for_round_off(shared_path):
     assert unknowns(build(scene(mesh, ("clay",)), WORLD), TIED) == 2 * 2 * 2
 
 
+def test_tied_sides_that_touch_are_refused():
+    """Sides thinner than round-off: each node faces more than one."""
+    domain = box([4.0, 1e-12, 2.0], [1, 1, 1], "tetrahedron", comm=SELF)
+    tied = dict.fromkeys(("left", "right", "front", "back"), "tied")
+    with pytest.raises(SceneError, match="found nodes that are tied to themselves"):
+        constraint_matrix(domain, tied)
+
+
 def test_a_roller_on_a_slope(shared_path):
     mesh = on_rank_zero(gmsh_section, shared_path / "a.msh")
     domain = build(scene(mesh), WORLD)
