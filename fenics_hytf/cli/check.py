@@ -12,6 +12,7 @@ from fenics_hytf.cli.collective import at_root, load_scene
 from fenics_hytf.cli.outcome import DONE, InputError, RunRequest, say, tell
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import Inspection, factor_of_safety, inspect
+from fenics_hytf.simulation.demand import SEARCH
 
 
 def check_scene(request: RunRequest, comm: MPI.Comm, plot: Path | None = None) -> int:
@@ -108,7 +109,10 @@ def _factorisations(inspection: Inspection) -> str:
     text = f"at most {inspection.factorisations}"
     if not inspection.searched:
         return text
-    return f"{text} of lines, and about {inspection.searched} to find what slips"
+    return (
+        f"{text} of lines, and about {inspection.searched} to find what slips, {SEARCH} more with "
+        "each lapse that it adds"
+    )
 
 
 def _stability(safety: float) -> str:

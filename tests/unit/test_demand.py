@@ -3,7 +3,20 @@
 
 Estimates of memory beside measured peaks, on one rank unless said otherwise:
 
-TABLE
+    run                                      unknowns  points  MiB told  measured  ratio
+    2D, direct, one lapse                       14400   28800       436       369   1.18
+    2D, reduced, triangles                      40000  120000       832       640   1.30
+    2D, reduced, four lapses with fields        22500   45000       643       786   0.82
+    2D, three lapses of hysteretic soil          6400   12800       385       384   1.00
+    2D, out of the plane                        20000   80000       480       430   1.11
+    2D, a record of 40 000 samples                 40      80       397       409   0.97
+    3D, direct, hexahedra                        5070   11520       431       359   1.20
+    3D, reduced, hexahedra                      10404   24576       632       545   1.16
+    3D, reduced, tetrahedra                      6750   47040       556       418   1.33
+    3D, two ranks that share the mesh           10404   24576       895       847   1.06
+    3D, two ranks with a mesh each              10404   24576      1265      1123   1.13
+    a slope that slides, three lapses            1498    2688       295       434   0.68
+    a slope that runs out, 14 lapses             1260    5625       290       368   0.79
 """
 
 from __future__ import annotations
