@@ -193,7 +193,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on(here):
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
     try:
         deadline = time.monotonic() + 120
-        while len(list(runs.glob("*.json"))) < 2:
+        while len(list(runs.glob("[!.]*.json"))) < 2:
             assert process.poll() is None and time.monotonic() < deadline
             time.sleep(0.05)
         process.send_signal(signal.SIGTERM)
@@ -202,7 +202,7 @@ def test_interrupted_it_keeps_what_is_done_and_goes_on(here):
         process.kill()
     assert process.returncode == 130
     assert not list(runs.glob(".run-*")) and not (here / "s-accuracy/accuracy.csv").exists()
-    kept = {path: path.stat().st_mtime_ns for path in runs.glob("*.json")}
+    kept = {path: path.stat().st_mtime_ns for path in runs.glob("[!.]*.json")}
     assert len(kept) >= 2
     budget = [*command, "--budget", "3"]
     again = subprocess.run(budget, capture_output=True, text=True, timeout=200, env=os.environ)
