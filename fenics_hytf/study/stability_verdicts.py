@@ -34,7 +34,7 @@ PUMPED = 2.0
 """Energy that changes of the moduli bring over that which comes in at the base [-].
 
 With more it is no longer the shaking that moves the ground, be its motion true or not. Moduli that
-fall once bring up to 0.9, as stress that goes on strains softer ground more; moduli that swing to a
+fall once bring up to 1.2, as stress that goes on strains softer ground more; moduli that swing to a
 hundredth and back bring 8 and more.
 """
 GROWTH = 2.0

@@ -203,7 +203,7 @@ def test_the_report_tells_seams_and_energy(tmp_path):
     assert "Degradation index [-]" in text and " 0.960 " in text
 
 
-@pytest.mark.parametrize(("share", "told"), [(0.5, False), (2.0, True)])
+@pytest.mark.parametrize(("share", "told"), [(1.2, False), (4.0, True)])
 def test_moduli_that_bring_more_energy_than_the_shaking_stand_out(share, told, tmp_path):
     result = make_result(lapses=3)
     come = sum(lapse.energy.input for lapse in result.lapses)
