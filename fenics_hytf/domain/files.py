@@ -41,6 +41,7 @@ _CELLS = {
     "hexahedron27": ("hexahedron", 3, 2, "quad9"),
 }
 _FACETS = {"line": "interval", "line3": "interval"} | {k: v[0] for k, v in _CELLS.items()}
+_FARTHEST = 1e30  # m; squares of such coordinates are numbers too
 _APART = 1e-9  # of the size of a mesh: nodes that are not farther apart are at one place
 _IGNORED = {"vertex", "line", "line3", "triangle", "triangle6", "quad", "quad9"}
 
@@ -172,9 +173,11 @@ def _points(
     if used[0] < 0 or used[-1] >= len(raw.points):
         raise _fault(f"cells of {path.name} with nodes that it does not hold", "a whole mesh")
     points = np.asarray(raw.points, float)[used]
-    if not np.isfinite(points).all():
-        bad = used[np.flatnonzero(~np.isfinite(points).all(axis=1))[0]]
-        raise _fault(f"node {bad} of {path.name} at {raw.points[bad]}", "finite coordinates [m]")
+    sound = (np.abs(points) <= _FARTHEST).all(axis=1)
+    if not sound.all():
+        bad = used[np.flatnonzero(~sound)[0]]
+        found = f"node {bad} of {path.name} at {raw.points[bad]}"
+        raise _fault(found, f"finite coordinates, up to {_FARTHEST:g} [m]")
     if points.shape[1] > gdim and np.ptp(points[:, 2]) > 1e-9 * np.ptp(points):
         found = f"cells of {path.name} out of the plane z = const"
         raise _fault(found, "a 2D mesh in x and y, y up, or the cells of a volume")

@@ -597,8 +597,9 @@ def test_cells_that_make_no_mesh(tmp_path, cells, said):
     assert said in faults(write(tmp_path / "a.vtu", cells))["mesh.file"]
 
 
-def test_nodes_that_are_no_numbers(tmp_path):
-    found = faults(write(tmp_path / "a.vtu", SQUARES, places=moved(n4=[np.nan, 1.0])))
+@pytest.mark.parametrize("x", [np.nan, np.inf, 1e300])
+def test_nodes_that_are_no_numbers(tmp_path, x):
+    found = faults(write(tmp_path / "a.vtu", SQUARES, places=moved(n4=[x, 1.0])))
     assert "node 4 of a.vtu" in found["mesh.file"]
 
 
