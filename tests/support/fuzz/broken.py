@@ -135,7 +135,6 @@ def _blow_up(draw: st.DrawFn, data: dict[str, Any]) -> None:
         tables.append((motion["synthetic"], "dt", draw(st.sampled_from((1e-300, 1e300)))))
     effects = data.setdefault("effects", {})
     tables += [
-        (effects, "equivalent_linear", {"max_iterations": number}),
         (effects, "gravity", {"acceleration": draw(st.sampled_from((1e300, 1e-300)))}),
         (effects, "rayleigh", {"alpha": 1e300, "beta": draw(st.sampled_from((0.0, 1e300)))}),
         (effects, "sliding", {"time_step": 1e-12, "longest": 1e12}),
