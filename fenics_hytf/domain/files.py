@@ -66,7 +66,10 @@ def read_mesh(path: Path, soils: tuple[str, ...]) -> MeshData:
     kind = _cell_kind(raw, path)
     name, gdim, degree, facet_kind = _CELLS[kind]
     _refuse_nameless(raw, {kind: gdim, facet_kind: gdim - 1}, path)
-    cells = np.concatenate([b.data for b in raw.cells if b.type == kind]).astype(np.int64)
+    blocks = [b.data for b in raw.cells if b.type == kind]
+    if len({block.shape[1:] for block in blocks}) > 1:
+        raise _fault(f"cells of {path.name} that lack nodes", "a whole mesh")
+    cells = np.concatenate(blocks).astype(np.int64)
     used, inverse = np.unique(cells, return_inverse=True)
     points = _points(raw, used, gdim, path)
     number = np.full(len(raw.points), -1, np.int64)
