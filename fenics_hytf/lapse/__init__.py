@@ -31,6 +31,7 @@ from fenics_hytf.lapse.peaks import peak_length, peak_shear_strain
 from fenics_hytf.lapse.records import (
     CellState,
     LapseResult,
+    LoopHistory,
     SlipResult,
     SofteningResult,
 )
@@ -72,6 +73,7 @@ __all__ = [
     "LapseEquations",
     "LapseError",
     "LapseResult",
+    "LoopHistory",
     "Material",
     "Mechanism",
     "MechanismError",

@@ -5,8 +5,6 @@ Naively a file that is half written takes the one before with it, and a full dis
 traceback.
 """
 
-import json
-import os
 import re
 import signal
 import subprocess
@@ -16,11 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.restart import SCENE
+from support.restart import KILLS, SCENE, other_files
 
 HYTF = [sys.executable, "-m", "fenics_hytf.cli", "run", "s.toml", "--no-plots", "--quiet"]
 TEN = ["--set", "lapses.count=10", "--set", "motion.0.synthetic.n=400"]
-KILLS = int(os.environ.get("HYTF_KILLS", "3"))  # ten by 'docker/run hard'
 
 
 @pytest.fixture
@@ -28,21 +25,6 @@ def folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.chdir(tmp_path)
     Path("s.toml").write_text(SCENE)
     return tmp_path
-
-
-def other_files(whole: str, resumed: str) -> int:
-    """How many files differ: tables in any byte, the summary but for times."""
-    names = sorted(p.name for p in Path(whole).iterdir())
-    assert names == sorted(p.name for p in Path(resumed).iterdir())
-    assert "checkpoint" not in names
-    tables = [name for name in names if not name.endswith(".json")]
-    other = sum(Path(whole, n).read_bytes() != Path(resumed, n).read_bytes() for n in tables)
-    summaries = [json.loads(Path(d, "summary.json").read_text()) for d in (whole, resumed)]
-    for summary in summaries:
-        for key in ("written", "wall_s", "peak_memory_bytes"):
-            del summary[key]
-        del summary["work"]["wall_s"]
-    return other + (summaries[0] != summaries[1])
 
 
 @pytest.mark.timeout(900)

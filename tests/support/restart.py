@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from mpi4py import MPI
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import CheckpointFolder, Result, simulate
 
+KILLS = int(os.environ.get("HYTF_KILLS", "3"))  # ten by 'docker/run hard'
 SCENE = """
 title = "A section"
 [mesh]
@@ -114,3 +117,18 @@ def counts(result: Result) -> dict:
     """Work done, but for the time it took."""
     work = dataclasses.asdict(result.work)
     return {name: value for name, value in work.items() if name != "wall_s"}
+
+
+def other_files(whole: str, resumed: str) -> int:
+    """How many files differ: tables in any byte, the summary but for times."""
+    names = sorted(p.name for p in Path(whole).iterdir())
+    assert names == sorted(p.name for p in Path(resumed).iterdir())
+    assert "checkpoint" not in names
+    tables = [name for name in names if not name.endswith(".json")]
+    other = sum(Path(whole, n).read_bytes() != Path(resumed, n).read_bytes() for n in tables)
+    summaries = [json.loads(Path(d, "summary.json").read_text()) for d in (whole, resumed)]
+    for summary in summaries:
+        for key in ("written", "wall_s", "peak_memory_bytes"):
+            del summary[key]
+        del summary["work"]["wall_s"]
+    return other + (summaries[0] != summaries[1])
