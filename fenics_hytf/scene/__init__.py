@@ -5,12 +5,13 @@ A scene is read and checked whole before anything is computed; every fault is re
 each with its key, what was found and what was expected. How anything is solved is not known here.
 """
 
+from fenics_hytf.scene.axes import components_of
 from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.continuity import ABOVE_BAND, PERIODS, motion_band, short_lapses
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
-from fenics_hytf.scene.mesh import MOST_CELLS, Box, Column, Layer, Mesh, components_of
+from fenics_hytf.scene.mesh import MOST_CELLS, Box, Column, Layer, Mesh
 from fenics_hytf.scene.motion import MotionInput, direction_fault
 from fenics_hytf.scene.output import Output, Receiver
 from fenics_hytf.scene.quadrature import (

@@ -16,8 +16,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from fenics_hytf.scene.axes import AXES
 from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import AXES
 from fenics_hytf.scene.table import Fraction, Positive, Table, read_table
 
 BOUNDARY_KINDS = ("rigid", "fixed", "roller", "tied", "free", "dashpot", "free_field")

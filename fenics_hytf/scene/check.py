@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from fenics_hytf.motion import split
+from fenics_hytf.scene.axes import raw_components, raw_gdim
 from fenics_hytf.scene.boundary import (
     BOUNDARY_KINDS,
     Boundary,
@@ -37,7 +38,7 @@ from fenics_hytf.scene.faults import (
     name_key,
     toml_text,
 )
-from fenics_hytf.scene.mesh import Mesh, layout, raw_components, raw_gdim, read_mesh
+from fenics_hytf.scene.mesh import Mesh, layout, read_mesh
 from fenics_hytf.scene.motion import MotionInput, input_rules, read_motions
 from fenics_hytf.scene.output import Output, read_output
 from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
+from fenics_hytf.scene.axes import CELLS, raw_gdim
 from fenics_hytf.scene.faults import Fault, SceneError, join_key, toml_text
 from fenics_hytf.scene.quadrature import allowed_points_per_cell, default_points_per_cell
 from fenics_hytf.scene.regions import RealArray, Region, polygon_rules
@@ -31,12 +32,10 @@ from fenics_hytf.scene.table import (
     read_table,
 )
 
-CELLS = {2: ("quadrilateral", "triangle"), 3: ("hexahedron", "tetrahedron")}
 BOUNDARIES = {
     2: ("base", "top", "left", "right"),
     3: ("base", "top", "left", "right", "front", "back"),
 }
-AXES = ("x", "y", "z")
 MOST_CELLS = 10_000_000
 """Cells of a mesh: about a kilobyte each while it is made, before its memory can be foretold."""
 
@@ -299,39 +298,6 @@ def is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
-
-
-def raw_gdim(raw: object) -> int | None:
-    """The dimension that a raw ``[mesh]`` table asks for, or ``None`` where it is open."""
-    if not isinstance(raw, dict):
-        return None
-    if raw.get("column") is not None:
-        return 2
-    box = raw.get("box")
-    size = box.get("size") if isinstance(box, dict) else None
-    return len(size) if isinstance(size, list | tuple) and len(size) in CELLS else None
-
-
-def components_of(gdim: int, kinematics: str | None) -> tuple[str, ...]:
-    """Names of the displacement components: across a section under antiplane kinematics.
-
-    Args:
-        gdim: Dimension of the mesh.
-        kinematics: Of the section, or ``None``.
-
-    Returns:
-        ``("x", "y")``, ``("z",)``, or all three in 3D.
-    """
-    return ("z",) if gdim == 2 and kinematics == "antiplane" else AXES[:gdim]
-
-
-def raw_components(raw: object) -> tuple[str, ...] | None:
-    """The displacement components of a raw ``[mesh]`` table, or ``None`` where they are open."""
-    gdim = raw_gdim(raw)
-    if gdim is None or not isinstance(raw, dict):
-        return None
-    kinematics = raw.get("kinematics")
-    return components_of(gdim, kinematics if isinstance(kinematics, str) else None)
 
 
 def _size_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:

@@ -13,8 +13,9 @@ import numpy as np
 from pydantic import Field
 
 from fenics_hytf import motion as records
+from fenics_hytf.scene.axes import AXES
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import AXES, is_file
+from fenics_hytf.scene.mesh import is_file
 from fenics_hytf.scene.table import (
     LARGEST,
     Positive,

@@ -25,11 +25,14 @@ _NUMBER = 8  # bytes of a real number
 # Of a reduced sweep in a section with 2 to 5 % damping: 14 to 19, and 100 to 160.
 _EXPANSIONS = 20
 _BASIS = 200
-SEARCH = 40
-"""Factorisations of a search for a mechanism, or for a factor of safety: 20 to 50 were measured."""
+SEARCH = 50
+"""Factorisations of a search for a mechanism, or for a factor of safety.
 
+The demos ``slope`` and ``runout`` took 64 and 41 each, in 4 and 16 searches.
+"""
 
 _PROGRAM = 275e6  # bytes: interpreter, libraries, compiled forms; on each rank
+_SAMPLE = 350  # bytes of each motion: what a check takes of a record of 6e6 samples
 _CELL = {2: 1.2e3, 3: 5e3}  # bytes: mesh, its connections and search tree
 _POINT = 400  # bytes
 _PARTS = 2  # stiffness matrices of a law without memory
@@ -43,6 +46,7 @@ _WORDS = {
     "solutions": 'solutions held: sweep = "reduced", or fewer lines by solver.max_frequency',
     "mesh": "mesh and points: fewer cells, or a smaller points_per_cell",
     "histories": "histories of cells and receivers: shorter records, fewer lapses or receivers",
+    "records": "records: shorter ones, or larger time steps",
     "programs": "programs: fewer ranks",
 }
 
@@ -198,6 +202,7 @@ def demand_of(scene: Scene, plan: Plan, sizes: Sizes, bytes_per_point: int = _PO
             **demand_of_mesh(sizes, parts, bytes_per_point).shared,
             "solutions": sizes.unknowns * plan.held * _ENTRY,
             "histories": seen + receivers + left,
+            "records": len(scene.motion) * samples * _SAMPLE,
         }
     )
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
@@ -105,8 +107,8 @@ def lapse_map(runs: Sequence[StabilityRun]) -> Figure:
             _scatter(axes, here, lambda r: (_number(r, "periods"), _number(r, "decay")))
             _rule(axes, PERIODS, margins.NEAR_PERIODS)
             axes.axhline(DEFAULT_DECAY, color=INK, linewidth=0.9, linestyle=DASHED, zorder=1)
-            _logarithmic(axes.xaxis, {_number(r, "periods") for r in here})
-            _logarithmic(axes.yaxis, {_number(r, "decay") for r in here})
+            _logarithmic(axes, "x", {_number(r, "periods") for r in here})
+            _logarithmic(axes, "y", {_number(r, "decay") for r in here})
             _leave_room(axes)
             axes.set_title(f"damping {100 * damping:g} %, {_fate(path, fraction)}", fontsize=9)
         for axes in line[len(fractions) :]:
@@ -135,8 +137,8 @@ def frequency_map(runs: Sequence[StabilityRun]) -> Figure:
         here = _of(runs, damping=damping, fraction=-less)
         _scatter(axes, here, lambda r: (_number(r, "periods"), _number(r, "above_band")))
         _rule(axes, PERIODS, margins.NEAR_PERIODS)
-        _logarithmic(axes.xaxis, {_number(r, "periods") for r in here})
-        _logarithmic(axes.yaxis, {_number(r, "above_band") for r in here})
+        _logarithmic(axes, "x", {_number(r, "periods") for r in here})
+        _logarithmic(axes, "y", {_number(r, "above_band") for r in here})
         _leave_room(axes)
         axes.axhline(margins.NEAR_BAND, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
         axes.axhspan(axes.get_ylim()[0], ABOVE_BAND * 0.97, color=QUIET, alpha=0.13, lw=0)
@@ -161,7 +163,7 @@ def block_map(runs: Sequence[StabilityRun]) -> Figure:
         _scatter(axes, here, lambda r: (fills.index(_number(r, "fill")), _number(r, "waves")))
         axes.set_title("with the ghost term, as runs have it" if ghost == "yes" else "without it")
         axes.axhline(margins.NEAR_WAVES, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
-        _logarithmic(axes.yaxis, {_number(r, "waves") for r in here})
+        _logarithmic(axes, "y", {_number(r, "waves") for r in here})
         _leave_room(axes)
         axes.set_xlim(-0.6, len(fills) - 0.4)
         axes.set_xticks(range(len(fills)), [f"{100 * fill:g}" for fill in fills], rotation=45)
@@ -301,9 +303,10 @@ def _rule(axes: Axes, refused: float, near: float) -> None:
     axes.axvline(near, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
 
 
-def _logarithmic(axis, values: Iterable[float]) -> None:  # type: ignore[no-untyped-def]
-    """A logarithmic axis with the values of the map on it."""
-    axis._set_axes_scale("log")
+def _logarithmic(axes: Axes, name: Literal["x", "y"], values: Iterable[float]) -> None:
+    """Make one of the axes logarithmic, with the values of the map on it."""
+    axes.set(**{f"{name}scale": "log"})
+    axis: Axis = axes.xaxis if name == "x" else axes.yaxis
     axis.set_major_locator(FixedLocator(sorted(values)))
     axis.set_minor_locator(NullLocator())
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.3g}"))

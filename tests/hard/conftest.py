@@ -8,6 +8,8 @@ ranks have left there are in the table too.
 
 import os
 import re
+import subprocess
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from _pytest.terminal import TerminalReporter
 from mpi4py import MPI
 from support.figures import Figure
 from support.hard_table import TITLES, Row, faults, lines, read, write
+from support.small_run import COLUMN, FOLDER, HYTF, RUN
 
 HERE = Path(__file__).parent
 KEPT = os.environ.get("HYTF_HARD_CSV")
@@ -52,6 +55,27 @@ def figure(request: pytest.FixtureRequest) -> Callable[..., None]:
         found.require()
 
     return require
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch) -> Path:
+    """The folder one stands in, with the scene of a small column, and no launcher around."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
+        monkeypatch.delenv(name, raising=False)
+    Path("s.toml").write_text(COLUMN)
+    return tmp_path
+
+
+@pytest.fixture(scope="session")
+def whole(tmp_path_factory) -> str:
+    """The result of the run that nothing befell."""
+    folder = tmp_path_factory.mktemp("whole")
+    (folder / "s.toml").write_text(COLUMN)
+    start = time.perf_counter()
+    subprocess.run([*HYTF, *RUN, "--quiet"], cwd=folder, check=True)
+    (folder / "took").write_text(f"{time.perf_counter() - start}")
+    return str(folder / FOLDER)
 
 
 def pytest_deselected(items: list[pytest.Item]) -> None:
