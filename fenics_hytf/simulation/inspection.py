@@ -15,6 +15,7 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.demand import Demand, Sizes, demand_of, plan_of
 from fenics_hytf.simulation.margins import edge_notes
+from fenics_hytf.simulation.resolution import at_first, too_coarse
 from fenics_hytf.soil import HELD_DAMPING
 
 _NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio from which cells lock noticeably
@@ -111,6 +112,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         notes=(
             *_notes(scene, scheme, lines, domain.region_names),
             *_locking_notes(scene, domain),
+            *too_coarse(scene, domain, at_first(scene, domain)),
             *edge_notes(scene, domain),
         ),
     )

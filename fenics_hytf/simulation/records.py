@@ -118,6 +118,7 @@ class Result:
         sizes: ``cells``, ``unknowns``, ``points``.
         work: Counts and wall seconds.
         peak_memory: Largest resident memory of a rank [bytes].
+        coarse: What is to be said of cells too large for the motion.
     """
 
     scene: Scene
@@ -134,6 +135,7 @@ class Result:
     sizes: dict[str, int]
     work: Work
     peak_memory: int
+    coarse: tuple[str, ...] = ()
 
     @property
     def time(self) -> RealArray:

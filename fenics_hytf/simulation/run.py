@@ -51,6 +51,7 @@ from fenics_hytf.simulation.records import (
     Work,
 )
 from fenics_hytf.simulation.reporter import Reporter
+from fenics_hytf.simulation.resolution import too_coarse
 from fenics_hytf.simulation.schedule import lapses_to_go, motion_of, samples
 from fenics_hytf.simulation.snapshots import take_snapshot
 from fenics_hytf.simulation.state import RunState
@@ -388,6 +389,11 @@ class Run:
             },
             work=self._work,
             peak_memory=self.comm.allreduce(peak_memory(), MPI.MAX),
+            coarse=too_coarse(
+                self.scene,
+                self.domain,
+                ((lapse.cells.region, lapse.cells.shear_modulus) for lapse in self.lapses),
+            ),
         )
 
     def destroy(self) -> None:
