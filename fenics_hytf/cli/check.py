@@ -106,7 +106,7 @@ def describe(inspection: Inspection, safety: float | None = None) -> str:
 
 
 def _factorisations(inspection: Inspection) -> str:
-    text = f"at most {inspection.factorisations}"
+    text = f"{'at most' if inspection.bounded else 'about'} {inspection.factorisations}"
     if not inspection.searched:
         return text
     return (

@@ -40,14 +40,22 @@ _MATRICES = 6  # besides: mass, the sums of each frequency, their symbolic copie
 _SEEN = 64  # cells whose histories are held at once
 _HISTORIES = 100  # bytes a line of each component that is seen: spectra, and five histories
 _VALUES = 2 * 22  # numbers of a cell that a lapse leaves, with the copy in the checkpoint
+_SHARED = "a coarser mesh, or more ranks that share it"
+# What takes memory in words, and what makes that less.
 _WORDS = {
-    "factors": "factors of the matrices: a coarser mesh, or more ranks that share it",
-    "matrices": "matrices: a coarser mesh, or more ranks that share it",
-    "solutions": 'solutions held: sweep = "reduced", or fewer lines by solver.max_frequency',
-    "mesh": "mesh and points: fewer cells, or a smaller points_per_cell",
-    "histories": "histories of cells and receivers: shorter records, fewer lapses or receivers",
-    "records": "records: shorter ones, or larger time steps",
-    "programs": "programs: fewer ranks",
+    "factors": ("factors of the matrices", _SHARED),
+    "matrices": ("matrices", _SHARED),
+    "solutions": (
+        "solutions held",
+        'sweep = "reduced", or fewer lines by solver.max_frequency',
+    ),
+    "mesh": ("mesh and points", "fewer cells, or a smaller points_per_cell"),
+    "histories": (
+        "histories of cells and receivers",
+        "shorter records, fewer lapses or receivers",
+    ),
+    "records": ("records", "shorter ones, or larger time steps"),
+    "programs": ("programs", "fewer ranks"),
 }
 
 
@@ -77,13 +85,17 @@ class Plan:
     Attributes:
         lines: Lines solved in each lapse.
         factorisations: Factorisations of sweeps and of starts, those of free-field columns among
-            them; with the equivalent-linear loop the most there can be.
+            them, and one a lapse of some effects; with all iterations that the equivalent-linear
+            loop may take.
+        bounded: Whether there can be no more of them: a reduced sweep takes what it needs, and what
+            slides may add lapses.
         searched: Factorisations that the mechanisms of what slides are expected to take besides.
         held: Solutions, or columns of a basis, that are held at once.
     """
 
     lines: tuple[int, ...]
     factorisations: int
+    bounded: bool
     searched: int
     held: int
 
@@ -107,7 +119,7 @@ class Demand:
         parts = {name: ranks // group * size for name, size in self.shared.items()}
         parts["programs"] = int(ranks * _PROGRAM)
         largest = max(parts, key=lambda name: parts[name])
-        what, less = _WORDS[largest].split(": ")
+        what, less = _WORDS[largest]
         return f"{gigabytes(parts[largest])} of it for {what}; less takes {less}"
 
 
@@ -160,16 +172,19 @@ def plan_of(scene: Scene, scheme: Scheme, components: Sequence[str]) -> Plan:
     sweeps = sum(solved) + (sum(solved[1:]) if twice else 0)
     # One more finds how a lapse starts; beside a whole record the first one starts at rest.
     starts = {"steady": 0, "handover": len(lines), "whole_record": len(lines) - 1}[scheme.name]
-    counted = scene.effects.geometric_stiffness and scene.effects.gravity is not None
+    # One a lapse sees whether the ground buckles, one what it gives way by as it softens.
+    effects = scene.effects
+    counted = (effects.geometric_stiffness and effects.gravity is not None) + effects.softening
     searched = 0
     if scene.effects.sliding is not None:
         ways = 2 * len([axis for axis in axes if axis != len(components) - 1])
         searched = SEARCH * (1 + ways + len(lines) - 1)
     return Plan(
-        lines,
-        (sweeps * (1 + columns) + starts) * iterations + counted * len(lines),
-        searched,
-        held,
+        lines=lines,
+        factorisations=(sweeps * (1 + columns) + starts) * iterations + counted * len(lines),
+        bounded=scene.solver.sweep == "direct" and scene.effects.sliding is None,
+        searched=searched,
+        held=held,
     )
 
 

@@ -37,6 +37,7 @@ class Inspection:
         lines: Lines solved in each lapse.
         factorisations: Factorisations of sweeps and of starts, see
             :class:`~fenics_hytf.simulation.demand.Plan`.
+        bounded: Whether there can be no more of them.
         searched: Factorisations that mechanisms are expected to take besides.
         demand: Estimated memory.
         ranks: Ranks that share the mesh.
@@ -53,6 +54,7 @@ class Inspection:
     complex_modulus: str
     lines: tuple[int, ...]
     factorisations: int
+    bounded: bool
     searched: int
     demand: Demand
     ranks: int
@@ -106,6 +108,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
         complex_modulus=_complex_modulus(scene),
         lines=lines,
         factorisations=plan.factorisations,
+        bounded=plan.bounded,
         searched=plan.searched,
         demand=demand_of(scene, plan, sizes, points.bytes_per_point),
         ranks=comm.size,

@@ -6,7 +6,7 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from fenics_hytf.lapse import scheme_of
-from fenics_hytf.scene import Mesh, Scene, Sections, components_of
+from fenics_hytf.scene import Scene, Sections, components_of
 from fenics_hytf.simulation import memory
 from fenics_hytf.simulation.demand import (
     Demand,
@@ -37,7 +37,7 @@ def room_faults(
     """
     if scene.mesh is None:
         return []
-    sizes = comm.bcast(_sizes(scene.mesh) if comm.rank == 0 else None)
+    sizes = comm.bcast(sizes_of(scene.mesh) if comm.rank == 0 else None)
     if sizes is None:
         return []
     group = group_size if group_size and comm.size % group_size == 0 else comm.size
@@ -61,10 +61,6 @@ def room_faults(
         f"{gigabytes(there)} that it has. {demand.words(comm.size, group)}. Try it all the same "
         "with --force"
     ]
-
-
-def _sizes(mesh: Mesh) -> Sizes | None:
-    return sizes_of(mesh)
 
 
 def _demand(scene: Scene | Sections, sizes: Sizes) -> Demand:

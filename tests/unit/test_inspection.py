@@ -96,6 +96,32 @@ def test_factorisations_of_a_direct_sweep(case, factorisations):
     assert sum(told.lines) == sum(lapse.solved_lines for lapse in result.lapses)
 
 
+def test_softening_factorises_once_a_lapse():
+    soft = {"degradation": {"threshold": 1e-6}, "gravity": True, "softening": True}
+    given = scene(effects=soft, lapses={"count": 2})
+    told, result = inspect(given), simulate(given)
+    without = inspect(scene(effects={**soft, "softening": False}, lapses={"count": 2}))
+    assert told.factorisations == without.factorisations + 2
+    assert without.factorisations < result.work.factorisations <= told.factorisations
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (scene(), "at most 276"),
+        (scene(solver={"sweep": "reduced"}), "about 63"),
+        (
+            scene(soil={**SAND, "cohesion": 50e3}, effects={"gravity": True, "sliding": True}),
+            "about 276 of lines, and about ",
+        ),
+    ],
+    ids=["direct", "reduced", "sliding"],
+)
+def test_factorisations_that_may_become_more_are_no_bound(given, words):
+    """A reduced sweep takes those that it needs, and what slides may add lapses."""
+    assert f"  factorisations  {words}" in describe(inspect(given))
+
+
 @pytest.mark.parametrize(
     ("case", "continuity", "law"),
     [
