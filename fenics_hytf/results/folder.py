@@ -22,7 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
-from fenics_hytf.results.files import part_of, replace_file
+from fenics_hytf.motion.files import part_of, replace_file
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.results.summary import summarise
 from fenics_hytf.results.writers import write_tables

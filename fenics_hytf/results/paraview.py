@@ -20,7 +20,7 @@ import meshio
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.results.files import replacing
+from fenics_hytf.motion.files import replacing
 
 if TYPE_CHECKING:
     from fenics_hytf.simulation import Snapshot

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.motion import default_periods, response_spectrum
-from fenics_hytf.results.files import replacing
+from fenics_hytf.motion.files import replacing
 from fenics_hytf.results.overburden import vertical_stress
 from fenics_hytf.results.sliding import slip_columns
 

@@ -28,6 +28,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 import fenics_hytf
+from fenics_hytf.motion.files import replacing
 from fenics_hytf.scene import Fault, Scene, SceneError, changed_keys, identity
 from fenics_hytf.simulation.errors import CheckpointError
 from fenics_hytf.simulation.packing import Arrays, pack, unpack
@@ -175,23 +176,17 @@ def write_checkpoint(
     Raises:
         CheckpointError: It could not be written.
     """
-    path, part = folder / FILE, folder / f"{FILE}.part"
+    path = folder / FILE
     try:
         if not folder.is_dir():
             folder.mkdir(parents=True)
             _to_disk(folder.parent)
-        part.unlink(missing_ok=True)  # whatever stands there is not written through
-        with part.open("x+b") as file:
+        with replacing(path) as part, part.open("r+b") as file:
             _write_archive(file, meta, arrays)
             _seal(file)
-        os.replace(part, path)
         _to_disk(folder)
     except OSError as error:
-        _discard(part)
         raise CheckpointError(_trouble(path, error)) from error
-    except BaseException:
-        _discard(part)
-        raise
 
 
 def read_checkpoint(folder: Path) -> Checkpoint | None:
@@ -347,11 +342,6 @@ def _to_disk(folder: Path) -> None:
             os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _discard(part: Path) -> None:
-    with suppress(OSError):
-        part.unlink()
 
 
 def _trouble(path: Path, error: OSError) -> str:

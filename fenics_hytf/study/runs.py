@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 import fenics_hytf
-from fenics_hytf.results.files import replace_file
+from fenics_hytf.motion.files import replace_file
 from fenics_hytf.scene import Scene
 
 RealArray = npt.NDArray[np.float64]

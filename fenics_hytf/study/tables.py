@@ -16,7 +16,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from fenics_hytf.results.files import replace_file
+from fenics_hytf.motion.files import replace_file
 from fenics_hytf.results.summary import own_version
 from fenics_hytf.study.knobs import LABELS, MESH
 from fenics_hytf.study.records import Point, Study, core_s, pareto

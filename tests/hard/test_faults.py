@@ -223,7 +223,7 @@ def test_what_a_killed_run_has_half_written_goes(here, whole, hytf):
 def test_a_link_in_the_folder_is_replaced_not_written_through(here, hytf):
     """Naively a link that someone left is a way out of the folder."""
     Path(FOLDER, "checkpoint").mkdir(parents=True)
-    for name in ("receivers.csv", ".summary.json", "checkpoint/state.npz.part", "points_0000.vtu"):
+    for name in ("receivers.csv", ".summary.json", "checkpoint/.state.npz", "points_0000.vtu"):
         Path(FOLDER, name).symlink_to(here / f"outside-{Path(name).name}")
     Path("outside-receivers.csv").write_text("mine")
     assert hytf(*RUN, "--quiet", "--resume")[0] == 0

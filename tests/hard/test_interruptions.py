@@ -74,7 +74,7 @@ def test_32_killed_while_a_checkpoint_is_written(folder, figure):
         assert subprocess.run([*dying, *resume], check=False).returncode == -9
         assert {p.name for p in Path("killed/checkpoint").iterdir()} == {
             "state.npz",
-            "state.npz.part",
+            ".state.npz",
         }
     subprocess.run([*HYTF, "-o", "killed", "--resume"], check=True)
     other = other_files("whole", "killed")

@@ -18,6 +18,7 @@ import pytest
 from mpi4py import MPI
 
 from fenics_hytf.lapse.records import LapseResult
+from fenics_hytf.motion.files import part_of
 from fenics_hytf.results import CHECKPOINT, folder_faults, open_result
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import CheckpointError, CheckpointFolder, Work
@@ -258,7 +259,7 @@ for _ in range(20):
     time.sleep(random.uniform(0.0, 0.15))
     os.kill(child, signal.SIGKILL)
     assert os.waitpid(child, 0)[1] == signal.SIGKILL
-    torn += (folder / "state.npz.part").exists()
+    torn += (folder / ".state.npz").exists()
     found = read_checkpoint(folder)
     number = found.meta["lapse"]
     assert number >= last and all((a == number).all() for a in found.arrays.values())
@@ -313,14 +314,14 @@ def test_a_result_folder_knows_its_checkpoint(tmp_path):
     with open_result(tmp_path / "r") as folder:
         assert folder.checkpoint == tmp_path / "r" / CHECKPOINT
         write_checkpoint(folder.checkpoint, META, {})
-        (folder.checkpoint / f"{FILE}.part").write_bytes(b"torn")
+        part_of(folder.checkpoint / FILE).write_bytes(b"torn")
     (fault,) = folder_faults(tmp_path / "r", force=False)
     assert "unfinished run" in fault and "--resume" in fault and "--force" in fault
     assert folder_faults(tmp_path / "r", force=False, resume=True) == []
     with open_result(tmp_path / "r", resume=True) as folder:
         folder.go_on()
         folder.clear()
-        assert names(folder.checkpoint) == [FILE, f"{FILE}.part"]
+        assert names(folder.checkpoint) == [f".{FILE}", FILE]
         folder.write(make_result())
     assert CHECKPOINT not in names(tmp_path / "r")
 

@@ -10,6 +10,7 @@ import sys
 
 import pytest
 
+from fenics_hytf.motion.files import replace_file
 from fenics_hytf.results import (
     ResultError,
     folder_faults,
@@ -18,7 +19,6 @@ from fenics_hytf.results import (
     publish,
     read_result,
 )
-from fenics_hytf.results.folder import replace_file
 from tests.unit.results_builder import make_result, make_snapshot
 
 

@@ -11,9 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
+from fenics_hytf.motion.files import replacing
 from fenics_hytf.results.figures.plane import Plane, discs, draw_mesh, picture_size
 from fenics_hytf.results.figures.style import length_unit, spread
-from fenics_hytf.results.files import replacing
 from fenics_hytf.results.ground import StoredPoints, read_points, snapshot_lapses
 from fenics_hytf.results.reader import StoredResult
 

@@ -18,7 +18,7 @@ from cycler import cycler
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fenics_hytf.results.files import replacing
+from fenics_hytf.motion.files import replacing
 
 RealArray = npt.NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from html import escape
 from typing import Any
 
 from fenics_hytf.motion import GRAVITY
+from fenics_hytf.motion.files import replace_file
 from fenics_hytf.results.figures.drawing import Drawing
-from fenics_hytf.results.files import replace_file
 from fenics_hytf.results.reader import StoredResult
 from fenics_hytf.results.report.conventions import method
 from fenics_hytf.results.report.findings import (
