@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from fenics_hytf.results.folder import replace_file
+from fenics_hytf.motion.files import replace_file
 from fenics_hytf.study.stability import BLOCK, CONTRAST, FREQUENCY, LAPSES, StabilityRun
 from fenics_hytf.study.stability_verdicts import Verdict
 
