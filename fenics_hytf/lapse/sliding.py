@@ -104,10 +104,8 @@ class Sliding:
 
     def _first(self) -> tuple[Mechanism, SlipState]:
         """The mechanism with the least k_y, over both senses of every horizontal motion."""
-        level = [axis for axis in self._equations.axes if axis != self._domain.gdim - 1]
         safety = self._slope.factor_of_safety()
-        ways = [(axis, sense) for axis in level if self._slope.moves(axis) for sense in (1, -1)]
-        candidates = [(self._find(axis, sense), axis, sense) for axis, sense in ways]
+        candidates = [(self._find(axis, sense), axis, sense) for axis, sense in self._slope.ways()]
         first = candidates[0]
         for candidate in candidates[1:]:
             lowest = first[0].yield_coefficient

@@ -55,8 +55,7 @@ class Slope:
     def __init__(self, scene: Scene, domain: Domain, statics: Statics) -> None:
         assert scene.effects.sliding is not None
         self._domain, self._statics, self._settings = domain, statics, scene.effects.sliding
-        shaken = {domain.components.index(m.direction) for m in scene.motion}
-        self._level = sorted(shaken - {domain.gdim - 1})
+        self._level = scene.level_axes(domain.gdim)
         soils = [scene.soil[name] for name in domain.region_names]
         self._cohesion = np.array([soil.cohesion or 0.0 for soil in soils])
         self._friction_angle = np.array([soil.friction_angle or 0.0 for soil in soils])
@@ -114,10 +113,15 @@ class Slope:
         nodes.destroy()
         return free
 
-    def _require_motion(self) -> None:
-        """Raise where the shaking can move nothing along the ground."""
-        if any(self.moves(axis) for axis in self._level):
-            return
+    def ways(self) -> list[tuple[int, int]]:
+        """Axes, and both senses of each, along which shaking can move ground for good (collective).
+
+        Raises:
+            SceneError: There is none.
+        """
+        ways = [(axis, sense) for axis in self._level if self.moves(axis) for sense in (1, -1)]
+        if ways:
+            return ways
         along = " and ".join("xyz"[axis] for axis in self._level)
         found = f"boundaries that hold every node of soil along {along}"
         expected = (
@@ -138,7 +142,7 @@ class Slope:
             MechanismError: No mechanism was found.
         """
         assert self._gravity is not None
-        self._require_motion()
+        self.ways()  # there are some
         if not self.moves(self._domain.gdim - 1):
             return np.inf
         safety = self._search.factor_of_safety(

@@ -8,7 +8,7 @@ each with its key, what was found and what was expected. How anything is solved 
 from fenics_hytf.scene.axes import components_of
 from fenics_hytf.scene.boundary import Boundary, Rock, default_kind
 from fenics_hytf.scene.check import Sections, check
-from fenics_hytf.scene.continuity import ABOVE_BAND, PERIODS, motion_band, short_lapses
+from fenics_hytf.scene.continuity import ABOVE_BAND, PERIODS, lapse_length_rules, motion_band
 from fenics_hytf.scene.faults import Fault, SceneError
 from fenics_hytf.scene.identity import changed_keys, identity
 from fenics_hytf.scene.mesh import MOST_CELLS, Box, Column, Layer, Mesh
@@ -69,7 +69,7 @@ __all__ = [
     "direction_fault",
     "examine",
     "identity",
+    "lapse_length_rules",
     "motion_band",
     "rule_degrees",
-    "short_lapses",
 ]

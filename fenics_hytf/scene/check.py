@@ -26,8 +26,8 @@ from fenics_hytf.scene.boundary import (
 from fenics_hytf.scene.continuity import (
     continuity_rules,
     resolve,
-    rules_with_sliding,
-    rules_with_softening,
+    sliding_rules,
+    softening_rules,
 )
 from fenics_hytf.scene.effects import effect_rules
 from fenics_hytf.scene.faults import (
@@ -283,13 +283,13 @@ def _settle_continuity(raw: dict[str, Any], sections: Sections) -> Iterator[Faul
         return
     lapses, solver = resolve(raw, lapses, solver, effects, motions, segments)
     sections.lapses, sections.solver = lapses, solver
-    yield from continuity_rules(raw, lapses, solver, motions, segments)
+    yield from continuity_rules(lapses, solver, motions, segments)
     if effects.sliding is not None:
         duration = max(segment.num_samples for segment in segments) * dt
-        yield from rules_with_sliding(effects.sliding, lapses, solver, duration, dt)
+        yield from sliding_rules(effects.sliding, lapses, solver, duration, dt)
     handed_over = lapses.continuity == "transient" and len(segments) > 1
     if handed_over and effects.softening and effects.convection:
-        yield from rules_with_softening(solver)
+        yield from softening_rules(solver)
     if handed_over and solver.complex_modulus != "maxwell" and sections.boundary is not None:
         for name, kind in sections.boundary.kinds.items():
             if kind == "free_field":

@@ -19,14 +19,14 @@ from fenics_hytf.motion import Segment, dominant_frequency, energy_band
 from fenics_hytf.scene.faults import Fault, toml_text
 from fenics_hytf.scene.motion import MotionInput
 from fenics_hytf.scene.settings import Effects, Lapses, Sliding, Solver
-from fenics_hytf.scene.table import as_list
+from fenics_hytf.scene.table import as_list, is_given
 
 ABOVE_BAND = 2.0
 """Least highest frequency over that below which 99 % of the motion's energy lies [-]."""
 PERIODS = 10.0
 """Least highest frequency times the length of a lapse [-]."""
 _MOST_REST = 10_000_000  # samples after the motion: 80 MB of zeros for each
-_MOST_STEPS = 100_000  # of the march in a lapse: its time goes with their square, here some 10 s
+_MOST_STEPS = 100_000  # of the march in a lapse, whose time goes with their square
 
 
 def resolve(
@@ -52,12 +52,12 @@ def resolve(
         frequency.
     """
     continuity, law = lapses.continuity, solver.complex_modulus
-    if not _names(raw, "lapses", "continuity"):
+    if not is_given(raw, "lapses", "continuity"):
         tables = as_list(raw.get("motion"))
         harmonic = all(isinstance(t, dict) and "harmonic" in t for t in tables)
         once = len(segments) == 1 or harmonic
         continuity = "steady" if once and effects.sliding is None else "transient"
-    if not _names(raw, "solver", "complex_modulus"):
+    if not is_given(raw, "solver", "complex_modulus"):
         several = continuity == "transient" and len(segments) > 1
         law = "maxwell" if several or effects.sliding is not None else "hysteretic"
     frequency = solver.reference_frequency
@@ -69,7 +69,7 @@ def resolve(
     )
 
 
-def rules_with_sliding(
+def sliding_rules(
     sliding: Sliding, lapses: Lapses, solver: Solver, duration: float, dt: float
 ) -> Iterator[Fault]:
     """What a mechanism that slides needs of lapses and law.
@@ -98,7 +98,7 @@ def rules_with_sliding(
         yield Fault("effects.sliding.longest", f"{sliding.longest:g}", expected)
 
 
-def rules_with_softening(solver: Solver) -> Iterator[Fault]:
+def softening_rules(solver: Solver) -> Iterator[Fault]:
     """What softening needs of the law, where points move from one transient lapse to the next.
 
     Args:
@@ -113,7 +113,6 @@ def rules_with_softening(solver: Solver) -> Iterator[Fault]:
 
 
 def continuity_rules(
-    raw: dict[str, Any],
     lapses: Lapses,
     solver: Solver,
     motions: tuple[MotionInput, ...],
@@ -122,7 +121,6 @@ def continuity_rules(
     """A reference frequency where it is used; a maximum frequency that lapses can bear.
 
     Args:
-        raw: The raw table of the scene.
         lapses: ``[lapses]``, resolved.
         solver: ``[solver]``, resolved.
         motions: The motions.
@@ -156,7 +154,7 @@ def continuity_rules(
         yield Fault("solver.max_frequency", found, expected)
 
 
-def short_lapses(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault]:
+def lapse_length_rules(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault]:
     """Transient lapses that are too short for any motion.
 
     Args:
@@ -173,11 +171,6 @@ def short_lapses(lapses: Lapses, num_samples: int, count: int) -> Iterator[Fault
         found = f"{toml_text(getattr(lapses, name))}, lapses of {num_samples} samples"
         expected = f"lapses of at least {least} samples: shorter transient ones drift apart"
         yield Fault(f"lapses.{name}", found, expected)
-
-
-def _names(raw: dict[str, Any], section: str, key: str) -> bool:
-    table = raw.get(section)
-    return isinstance(table, dict) and key in table
 
 
 def motion_band(motions: tuple[MotionInput, ...]) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf import motion as records
+from fenics_hytf.scene.axes import AXES
 from fenics_hytf.scene.boundary import Boundary
 from fenics_hytf.scene.check import Sections, check
 from fenics_hytf.scene.faults import Fault, SceneError
@@ -24,6 +25,7 @@ from fenics_hytf.scene.output import Output
 from fenics_hytf.scene.settings import Effects, Lapses, Points, Solver
 from fenics_hytf.scene.soil import Soil
 from fenics_hytf.scene.source import copy_data, read_source
+from fenics_hytf.scene.table import is_given
 
 RealArray = npt.NDArray[np.float64]
 
@@ -174,6 +176,18 @@ class Scene:
     def dt(self) -> float:
         """Time step of the motions [s]."""
         return float(self.motion[0].record.dt)
+
+    def names(self, section: str, key: str) -> bool:
+        """Whether the file has a value for a key of a section, so that no default stands there."""
+        return is_given(self.data, section, key)
+
+    def level_axes(self, gdim: int) -> list[int]:
+        """Axes of the motions along the ground, which drive what slides, in the motions' order.
+
+        Args:
+            gdim: Dimension of the mesh; its last axis is up.
+        """
+        return [axis for axis in map(AXES.index, self.directions) if axis != gdim - 1]
 
 
 def examine(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The sections that say how: lapses, effects, points, points and solver."""
+"""The sections that say how: lapses, effects, points and solver."""
 
 from __future__ import annotations
 

@@ -105,6 +105,12 @@ def given(raw: Mapping[str, Any], *names: str) -> list[str]:
     return [name for name in names if raw.get(name) is not None]
 
 
+def is_given(raw: Mapping[str, Any], section: str, key: str) -> bool:
+    """Whether a section of the raw scene has a value for a key."""
+    table = raw.get(section)
+    return isinstance(table, dict) and bool(given(table, key))
+
+
 def exactly_one(raw: Mapping[str, Any], key: str, *names: str) -> Iterator[Fault]:
     """A fault unless exactly one of the keys is given."""
     there = given(raw, *names)

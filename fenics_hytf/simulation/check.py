@@ -23,7 +23,7 @@ from fenics_hytf.scene import (
     SceneError,
     Sections,
     default_kind,
-    short_lapses,
+    lapse_length_rules,
 )
 from fenics_hytf.simulation.receivers import receiver_faults
 
@@ -46,7 +46,7 @@ def mesh_faults(
     domain, faults = examine(scene, comm)
     if isinstance(scene, Scene):
         segments = scene.segments
-        faults += short_lapses(scene.lapses, segments[0].num_samples, len(segments))
+        faults += lapse_length_rules(scene.lapses, segments[0].num_samples, len(segments))
     if domain is None:
         return None, faults
     try:

@@ -177,7 +177,7 @@ def plan_of(scene: Scene, scheme: Scheme, components: Sequence[str]) -> Plan:
     counted = (effects.geometric_stiffness and effects.gravity is not None) + effects.softening
     searched = 0
     if scene.effects.sliding is not None:
-        ways = 2 * len([axis for axis in axes if axis != len(components) - 1])
+        ways = 2 * len(scene.level_axes(len(components)))  # both senses of each
         searched = SEARCH * (1 + ways + len(lines) - 1)
     return Plan(
         lines=lines,

@@ -124,7 +124,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
 def _continuity(scene: Scene, scheme: Scheme) -> str:
     """The continuity in words: where it comes from and what is solved."""
     name, several = scene.lapses.continuity, len(scene.segments) > 1
-    if _names(scene, "lapses", "continuity"):
+    if scene.names("lapses", "continuity"):
         why = "named"
     elif scene.effects.sliding is not None:
         why = "the default for what slides"
@@ -147,7 +147,7 @@ def _continuity(scene: Scene, scheme: Scheme) -> str:
 def _complex_modulus(scene: Scene) -> str:
     """The complex modulus in words, and where it comes from."""
     name = scene.solver.complex_modulus
-    if _names(scene, "solver", "complex_modulus"):
+    if scene.names("solver", "complex_modulus"):
         why = "named"
     else:
         slides = scene.effects.sliding is not None
@@ -155,15 +155,11 @@ def _complex_modulus(scene: Scene) -> str:
         why = "the default" + (several if name == "maxwell" else "")
     if name != "maxwell":
         return f"{name} ({why})"
-    given = _names(scene, "solver", "reference_frequency")
+    given = scene.names("solver", "reference_frequency")
     frequency = f"{scene.solver.reference_frequency:.3g} Hz"
     return f"{name} ({why}), G at {frequency}, " + (
         "as named" if given else "the dominant frequency of the motion"
     )
-
-
-def _names(scene: Scene, section: str, key: str) -> bool:
-    return scene.data.get(section, {}).get(key) is not None
 
 
 def _notes(
