@@ -65,11 +65,11 @@ def simulate(
             solved = run.solve_lapse(segment)
             run.observe(solved, index, segment.start)
             run.count_cycles(solved)
-            run.hand_over(solved)
-            run.soften(solved)
-            run.convect(solved)
+            start = run.hand_over(solved)
+            given_way = run.soften(solved)
+            run.convect(solved, given_way)
             if snapshot is not None and (index + 1) % scene.output.every == 0:
-                run.show(solved, index, snapshot)
+                run.show(solved, index, start, snapshot)
             if checkpoint is not None:
                 run.keep(checkpoint)
         result = run.result()

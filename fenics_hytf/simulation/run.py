@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -43,6 +42,7 @@ from fenics_hytf.simulation.clock import Clock
 from fenics_hytf.simulation.groups import Groups, require_same_parts
 from fenics_hytf.simulation.memory import peak_memory
 from fenics_hytf.simulation.observation import Observation, lapse_result
+from fenics_hytf.simulation.owner import Owner
 from fenics_hytf.simulation.records import (
     ProgressCallback,
     Result,
@@ -58,16 +58,6 @@ from fenics_hytf.simulation.state import RunState
 from fenics_hytf.simulation.weighing import Weighing
 
 RealArray = npt.NDArray[np.float64]
-
-
-class _Destroyable(Protocol):
-    """What holds PETSc objects."""
-
-    def destroy(self) -> None:
-        """Destroy them."""
-
-
-Owned = TypeVar("Owned", bound=_Destroyable)
 
 
 class Run:
@@ -106,9 +96,7 @@ class Run:
         self._effective_strain: RealArray | None = None
         self._sliding: Sliding | None = None
         self._softening: Softening | None = None
-        self._given_way: RealArray | float = 0.0
-        self._start_field: RealArray | float = 0.0
-        self._owned: list[_Destroyable] = []
+        self._own = Owner()
 
     def set_up(self) -> None:
         """Mesh, points, receivers, and the operators that last for the whole run."""
@@ -147,11 +135,6 @@ class Run:
             self._cycles = None if cycles is None else CycleCount(cycles, self.domain)
             self._density = np.array([scene.soil[name].density for name in domain.region_names])
         self._ledger = self.points.ledger(self.domain.comm)
-
-    def _own(self, made: Owned) -> Owned:
-        """Note what is to be destroyed with the run."""
-        self._owned.append(made)
-        return made
 
     def restore(self, found: Checkpoint) -> None:
         """Go on from a checkpoint."""
@@ -266,26 +249,34 @@ class Run:
                 self.observation.probe, solved.response, carried, self._ground.region
             )
 
-    def hand_over(self, solved: Solved) -> None:
-        """Points take what goes on in the next lapse."""
+    def hand_over(self, solved: Solved) -> RealArray | float:
+        """Points take what goes on in the next lapse.
+
+        Returns:
+            What fields of this one are added to [m].
+        """
         with self.clock.phase("convection"):
-            if self.scene.output.fields:
-                self._start_field = self._displacement_at_start()
+            start = self._displacement_at_start()
             self.continuity.finish(self.points, solved.response, solved.material)
             for column in self.free_fields:
                 column.finish()
+        return start
 
     def _displacement_at_start(self) -> RealArray | float:
-        """What a field of the lapse is added to [m]: of the nodes, relative to the base."""
-        if not self.continuity.goes_on_from_nought:
+        """Of the nodes, relative to the base [m]; 0 where no field takes it in."""
+        if not (self.scene.output.fields and self.continuity.goes_on_from_nought):
             return 0.0
         carried = self.points["dynamic_displacement"] - self.observation.base_before
         return self.equations.field_of(self.points, carried)
 
-    def soften(self, solved: Solved) -> None:
-        """Static stress falls where G is lower than ever before, and the ground gives way."""
+    def soften(self, solved: Solved) -> RealArray | float:
+        """Static stress falls where G is lower than ever before.
+
+        Returns:
+            By what the ground gives way [m].
+        """
         if self._softening is None:
-            return
+            return 0.0
         assert self._ground is not None
         with self.clock.phase("convection"):
             increment = self._softening(self.points, self._ground, solved.moduli)
@@ -298,10 +289,10 @@ class Run:
                 if self.scene.effects.geometric_stiffness and not self.scene.effects.convection:
                     self.equations.stiffen(cell_stress(self.domain, self.points))
             softening = self._softening.result(self.points, moved)
-        self._given_way = 0.0 if increment is None else increment
         self.lapses[-1] = replace(self.lapses[-1], softening=softening)
+        return 0.0 if increment is None else increment
 
-    def convect(self, solved: Solved) -> None:
+    def convect(self, solved: Solved, given_way: RealArray | float) -> None:
         """Points take u(t_end) − u(t_start), move, and are found again by (7)-(9)."""
         if not self.scene.effects.convection:
             return
@@ -311,7 +302,7 @@ class Run:
             report = convect(
                 self.domain,
                 self.points,
-                u - self._nodal_motion(solved, 0.0) + self._given_way,
+                u - self._nodal_motion(solved, 0.0) + given_way,
                 outside=self.scene.points.outside,
                 # Softening has strained the static stress itself, and vibration does not.
                 constants=solved.material.real if self._softening is None else None,
@@ -329,7 +320,9 @@ class Run:
         unknowns = solved.response.unknowns_at(time, derivative)
         return self.equations.unknowns.expand(unknowns) - self.observation.base_at(unknowns)
 
-    def show(self, solved: Solved, index: int, snapshot: SnapshotCallback) -> None:
+    def show(
+        self, solved: Solved, index: int, start: RealArray | float, snapshot: SnapshotCallback
+    ) -> None:
         """Hand points and fields to whoever writes them."""
         time = samples(self.lapses) * self.scene.dt
         with self.clock.phase("output"):
@@ -341,7 +334,7 @@ class Run:
                     self.scene,
                     self.domain,
                     self.points,
-                    lambda instant: self._start_field + self._nodal_motion(solved, instant),
+                    lambda instant: start + self._nodal_motion(solved, instant),
                     solved.moduli,
                     self.lapses[-1],
                     time,
@@ -398,5 +391,4 @@ class Run:
 
     def destroy(self) -> None:
         """Destroy all PETSc objects."""
-        for owned in self._owned:
-            owned.destroy()
+        self._own.destroy()

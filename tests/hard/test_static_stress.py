@@ -68,7 +68,7 @@ def lapse_by_lapse(run: Run) -> Iterator[int]:
         run.observe(solved, segment.index, segment.start)
         run.hand_over(solved)
         yield segment.index
-        run.convect(solved)
+        run.convect(solved, 0.0)
 
 
 def imbalance(run: Run) -> float:
