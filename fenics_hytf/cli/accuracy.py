@@ -104,7 +104,14 @@ def _conduct(
 
 
 def _guard(budget: float | None) -> Callable[[], None]:
-    """What stops a study before a run for which there is no time."""
+    """What stops a study before a run for which there is no time.
+
+    Args:
+        budget: Wall time from now [s], or ``None``.
+
+    Returns:
+        To be called before a run; it raises :class:`BudgetSpent` once the time is over.
+    """
     start = time.monotonic()
 
     def check() -> None:

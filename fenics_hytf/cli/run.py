@@ -57,17 +57,17 @@ _LESS = (
 )
 
 
-def guarded(command: Command, request: RunRequest, comm: MPI.Comm = MPI.COMM_WORLD) -> int:
-    """Run a command and turn every way it can end into an exit code.
+def guarded(command: Command, request: RunRequest) -> int:
+    """Run a command and turn every way it can end into an exit code (collective).
 
     Args:
         command: The command.
         request: What was asked for.
-        comm: Communicator.
 
     Returns:
         The exit code.
     """
+    comm = MPI.COMM_WORLD
     try:
         with interruptible(comm):
             return command(request, comm)

@@ -9,7 +9,6 @@ from fenics_hytf.results.definition import describe_scene
 from fenics_hytf.results.folder import (
     CHECKPOINT,
     FINISHED,
-    PARTIAL,
     ResultError,
     ResultFolder,
     folder_faults,
@@ -19,22 +18,19 @@ from fenics_hytf.results.folder import (
 )
 from fenics_hytf.results.publish import publish
 from fenics_hytf.results.reader import (
-    StoredResult,
     as_written,
     read_result,
     read_summary,
     read_table,
     read_tables,
 )
-from fenics_hytf.results.summary import moving_components, summarise
+from fenics_hytf.results.summary import moving_components
 
 __all__ = [
     "CHECKPOINT",
     "FINISHED",
-    "PARTIAL",
     "ResultError",
     "ResultFolder",
-    "StoredResult",
     "as_written",
     "describe_scene",
     "folder_faults",
@@ -47,5 +43,4 @@ __all__ = [
     "read_summary",
     "read_table",
     "read_tables",
-    "summarise",
 ]

@@ -88,10 +88,15 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits - 1}e}"
 
 
-def span(values: Sequence[float | None], factor: float = 1.0, digits: int = 3) -> str:
-    """A range from the smallest to the largest; one number where they are alike."""
-    ends = [NOTHING if v is None else number(factor * v, digits) for v in values]
-    return ends[0] if ends[0] == ends[-1] else f"{ends[0]} to {ends[-1]}"
+def span(ends: Sequence[float | None], factor: float = 1.0) -> str:
+    """A range; one number where its ends are alike.
+
+    Args:
+        ends: The smallest value and the largest.
+        factor: What they are multiplied by.
+    """
+    smallest, largest = (NOTHING if end is None else number(factor * end) for end in ends)
+    return smallest if smallest == largest else f"{smallest} to {largest}"
 
 
 def power(value: float | None) -> str:
