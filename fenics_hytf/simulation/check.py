@@ -25,7 +25,7 @@ from fenics_hytf.scene import (
     default_kind,
     lapse_length_rules,
 )
-from fenics_hytf.simulation.receivers import receiver_faults
+from fenics_hytf.simulation.receivers import receiver_faults, without_soil
 
 
 def mesh_faults(
@@ -59,7 +59,8 @@ def mesh_faults(
     faults += _locking_faults(scene, domain)
     faults += _sliding_faults(scene, domain)
     if scene.output is not None:
-        faults += receiver_faults(domain, scene.output.receivers)
+        outside = receiver_faults(domain, scene.output.receivers)
+        faults += outside or _empty_faults(scene, domain)
     if scene.boundary is not None and not faults:
         faults += _boundary_faults(scene, domain)
     if scene.effects is not None and scene.effects.equivalent_linear is not None:
@@ -99,6 +100,24 @@ def _locking_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
         return []
     expected = "quadrilaterals or hexahedra, or degree 2"
     return [Fault("effects.locking", f"{name} of degree 1", expected)]
+
+
+def _empty_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
+    """Without convection no point ever gets to a receiver in a region without soil."""
+    if scene.mesh is None or not scene.mesh.empty or scene.output is None:
+        return []
+    if scene.effects is None or scene.effects.convection:
+        return []
+    receivers = scene.output.receivers
+    expected = "a place in the ground: no point moves there without effects.convection"
+    return [
+        Fault(
+            f"output.receivers.{name}",
+            f"{list(receivers[name].place)} in a region of mesh.empty",
+            expected,
+        )
+        for name in without_soil(domain, receivers)
+    ]
 
 
 def _sliding_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:

@@ -16,6 +16,7 @@ from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.demand import Demand, Sizes, demand_of, plan_of
 from fenics_hytf.simulation.margins import edge_notes
 from fenics_hytf.simulation.resolution import at_first, too_coarse
+from fenics_hytf.simulation.receivers import without_soil
 from fenics_hytf.soil import HELD_DAMPING
 
 _NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio from which cells lock noticeably
@@ -116,6 +117,7 @@ def inspect(scene: Scene, comm: MPI.Comm = MPI.COMM_WORLD) -> Inspection:
             *_notes(scene, scheme, lines, domain.region_names),
             *_locking_notes(scene, domain),
             *too_coarse(scene, domain, at_first(scene, domain)),
+            *_receiver_notes(scene, domain),
             *edge_notes(scene, domain),
         ),
     )
@@ -191,6 +193,15 @@ def _notes(
         yield "softening is an estimate from reduced stiffness: it knows neither strength nor time"
     if effects.geometric_stiffness and effects.gravity is None:
         yield "the points start without stress: geometric_stiffness adds nothing yet"
+
+
+def _receiver_notes(scene: Scene, domain: Domain) -> Iterator[str]:
+    """Receivers that the ground has yet to get to, and what is written of them meanwhile."""
+    for name in without_soil(domain, scene.output.receivers) if scene.mesh.empty else ():
+        yield (
+            f"receiver {name}: there is no soil at the start (mesh.empty); until points get there "
+            "its motion is that of the base, or within a cell of the ground between both"
+        )
 
 
 def _locking_notes(scene: Scene, domain: Domain) -> Iterator[str]:

@@ -6,11 +6,22 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf._compat import geometry_dofmap
 from fenics_hytf.domain import Domain
-from fenics_hytf.particles import Points, Sites, locate, resolve_owners, transfer_matrix
+from fenics_hytf.particles import (
+    Points,
+    Sites,
+    inverse_map,
+    locate,
+    resolve_owners,
+    transfer_matrix,
+)
 from fenics_hytf.scene import Fault, Receiver
 
 RealArray = npt.NDArray[np.float64]
+
+# Of a cell, by which a place on the surface may miss it: coordinates are written rounded.
+_BESIDE = 1e-3
 
 
 def find_places(
@@ -60,6 +71,39 @@ def receiver_faults(domain: Domain, receivers: dict[str, Receiver]) -> list[Faul
         if not is_inside
     ]
     return faults
+
+
+def without_soil(domain: Domain, receivers: dict[str, Receiver]) -> list[str]:
+    """Fixed receivers that stand where no soil is at the start (collective).
+
+    Args:
+        domain: The domain.
+        receivers: Receivers by name, inside the mesh.
+
+    Returns:
+        Their names, the same on every rank; none of those on the surface of the ground, which
+        stands in cells of either kind.
+    """
+    fixed = {name: r.place for name, r in receivers.items() if not r.rides}
+    ground = np.flatnonzero(domain.regions[: domain.num_owned_cells] >= 0)
+    nodes = domain.mesh.geometry.x[geometry_dofmap(domain.mesh)[ground], : domain.gdim]
+    lowest, highest = nodes.min(axis=1), nodes.max(axis=1)
+    slack = _BESIDE * (highest - lowest).max(axis=1, keepdims=True)
+    stand = np.zeros(len(fixed), bool)
+    for number, place in enumerate(fixed.values()):
+        near = ((lowest - slack <= place) & (place <= highest + slack)).all(axis=1)
+        cells = ground[near]
+        X, _ = inverse_map(domain.mesh, np.tile(place, (len(cells), 1)), cells)
+        stand[number] = bool((_outside(domain, X) <= _BESIDE).any())
+    on_ground = domain.comm.allreduce(stand.astype(int)) > 0
+    return [name for name, stands in zip(fixed, on_ground, strict=True) if not stands]
+
+
+def _outside(domain: Domain, X: RealArray) -> RealArray:
+    """How far reference coordinates are outside their cell, of its size, shape ``(n,)``."""
+    simplex = domain.mesh.topology.cell_name() in ("triangle", "tetrahedron")
+    beyond = X.sum(axis=1) if simplex else X.max(axis=1)
+    return np.asarray(np.maximum((-X).max(axis=1), beyond - 1.0))
 
 
 class Receivers:
