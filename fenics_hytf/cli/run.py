@@ -211,7 +211,12 @@ def _farewell(checkpoint: CheckpointFolder, scene: Scene) -> str:
 
 def _lapse(checkpoint: CheckpointFolder, scene: Scene) -> str:
     assert checkpoint.lapse is not None
-    return f"lapse {checkpoint.lapse} ({checkpoint.lapse + 1} of {len(scene.segments)})"
+    done, planned = checkpoint.lapse + 1, len(scene.segments)
+    if done > planned:
+        place = f"{planned} of the scene, {done - planned} that sliding added"
+    else:
+        place = f"{done} of {planned}"
+    return f"lapse {checkpoint.lapse} ({place})"
 
 
 def _simulate(

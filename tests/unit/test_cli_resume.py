@@ -97,6 +97,16 @@ def test_an_unfinished_run_is_gone_on_with(here, hytf, march):
     assert "summary.json" in files() and "points_0000.vtu" in files()
 
 
+def test_lapses_that_sliding_adds_are_told_apart(here, hytf, march):
+    march(stop=2, error=KeyboardInterrupt())
+    two = ("--no-plots", "--set", "lapses.count=2")
+    assert hytf("run", "s.toml", *two)[0] == 130
+    march()
+    code, _, err = hytf("run", "s.toml", *two, "--resume")
+    assert code == 0
+    assert "going on after lapse 2 (2 of the scene, 1 that sliding added)" in err
+
+
 def test_without_a_checkpoint_it_starts_anew(here, hytf, march):
     done = march()
     code, _, err = hytf("run", "s.toml", "--no-plots", "--resume")
