@@ -63,11 +63,8 @@ def mesh_faults(
         faults += outside or _empty_faults(scene, domain)
     if scene.boundary is not None and not faults:
         faults += _boundary_faults(scene, domain)
-    if scene.effects is not None and scene.effects.equivalent_linear is not None:
-        soils = [scene.soil.get(name) for name in domain.region_names]
-        if not faults and all(soil is not None and soil.curve is None for soil in soils):
-            expected = f"curves for one of the mesh's soils, {', '.join(domain.region_names)}"
-            faults.append(Fault("effects.equivalent_linear", "no soil with curves", expected))
+    if not faults:
+        faults += _curve_faults(scene, domain)
     return domain, faults
 
 
@@ -88,6 +85,20 @@ def checked_domain(scene: Scene, comm: MPI.Comm) -> Domain:
     if domain is None or faults:
         raise SceneError(faults)
     return domain
+
+
+def _curve_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:
+    """Curves are of soils that fill a cell; that no soil at all has any, the scene has told."""
+    if scene.effects is None or scene.effects.equivalent_linear is None or scene.mesh is None:
+        return []
+    filling = [scene.soil.get(name) for name in domain.region_names]
+    named = [scene.soil.get(name) for name in scene.mesh.soil_names or scene.soil]
+    if any(soil is None or soil.curve is not None for soil in filling):
+        return []
+    if all(soil is not None and soil.curve is None for soil in named):
+        return []
+    expected = f"curves for one of the mesh's soils, {', '.join(domain.region_names)}"
+    return [Fault("effects.equivalent_linear", "no soil with curves", expected)]
 
 
 def _locking_faults(scene: Scene | Sections, domain: Domain) -> list[Fault]:

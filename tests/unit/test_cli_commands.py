@@ -430,6 +430,36 @@ def test_a_box_without_soils_is_told_with_the_faults_of_its_mesh(here, hytf):
         assert "soil: found an empty table" in err
 
 
+CURVES = "curves = { strain = [1e-6, 1e-2], modulus = [1.0, 0.1], damping = [0.01, 0.2] }\n"
+SLOPE = Path(__file__).parents[2] / "meshes" / "slope.msh"
+LOOP = ("--set", "effects.equivalent_linear=true")
+
+
+def with_mesh(mesh: str, *soils: str) -> str:
+    """The scene with another mesh and soils alike; that of the last one has curves."""
+    start, end = SCENE.index("column ="), SCENE.index("[soil.sand]")
+    soil, rest = SCENE[end : SCENE.index("[[motion]]")], SCENE[SCENE.index("[[motion]]") :]
+    tables = "".join(soil.replace("sand", name) for name in soils)
+    return SCENE[:start] + mesh + tables + CURVES + rest.replace("8.0]", "1.0]")
+
+
+def test_missing_curves_are_told_once(here, hytf):
+    """By the scene where it names all soils of the mesh, by the mesh of a file."""
+    told = "hytf: effects.equivalent_linear: found no soil with curves; expected curves "
+    code, _, err = hytf("check", "s.toml", *LOOP)
+    assert (code, err) == (2, told + "in one of the soils sand\n")
+    box = 'box = { size = [1.0, 8.0], cells = [1, 4] }\nregions = [ { soil = "sand" } ]\n'
+    Path("s.toml").write_text(with_mesh(box, "sand", "clay"))
+    code, _, err = hytf("check", "s.toml", *LOOP)
+    assert (code, err) == (2, told + "in one of the soils sand\n")
+    file = f'file = "{SLOPE}"\nempty = ["air"]\n'
+    Path("s.toml").write_text(with_mesh(file, "soil", "seam", "rock", "clay"))
+    code, _, err = hytf("check", "s.toml", *LOOP)
+    assert (
+        code == 2 and err.startswith(told + "for one of the mesh's soils, ") and "clay" not in err
+    )
+
+
 @pytest.mark.parametrize("sweep", ["direct", "reduced"])
 def test_motion_beyond_bounds_stops_the_run(here, hytf, sweep):
     Path("s.toml").write_text(SCENE.replace("amplitude = 1.0", "amplitude = 1e25"))
