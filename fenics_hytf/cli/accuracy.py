@@ -147,6 +147,8 @@ def closing_words(study: Study, folder: Path) -> str:
     text = f"errors against the {study.reference.text}"
     if study.reference.uncertainty:
         text += f", itself uncertain by {100 * study.reference.uncertainty:.2g} %"
+    elif study.reference.pending:
+        text += ", how uncertain itself is not known yet"
     parts = [f"{study.title}\n{text}", table(study), slip_table(study), twin_table(study)]
     parts.append("\n".join(study.sentences))
     failed = [p for p in (*study.points, *study.twin.points) if p.failure]

@@ -119,8 +119,8 @@ class _Course:
             finest = self._first_that_runs(affordable(knobs, costs, own_cost, FINEST), fine)
             found = self._outcomes[finest]
             assert found.response is not None  # it ran
-            self._refer(f"finest run ({knobs.name(finest)})", found.response, found.slid)
             self._finest = finest
+            self._refer(f"finest run ({knobs.name(finest)})", found.response, found.slid)
         knobs.notes += left_out(knobs, self._finest or fine)
         turned = self._turned_from(fine)
         held = [knobs.own.turned(knob, getattr(fine, knob)) for knob in fine.differing(knobs.own)]
@@ -219,9 +219,10 @@ class _Course:
     def _refer(self, text: str, response: RealArray, slid: Mapping[str, float]) -> None:
         """Measure from here on against a response, and what slid in it."""
         self._yardstick = self._against(response, slid)
-        self._reference = Reference(text, 0.0)
+        pending = self._finest is not None  # a run itself; a closed form is exact
+        self._reference = Reference(text, 0.0, pending=pending)
         if slid.get(SLIP):
-            self._slip_reference = Reference(text, 0.0)
+            self._slip_reference = Reference(text, 0.0, pending=pending)
         elif slid:
             self.knobs.notes.append("slip: nothing slides in the reference")
 

@@ -77,13 +77,15 @@ class Reference:
 
     Attributes:
         text: What it is, in words.
-        uncertainty: Estimate of its own error, relative L2 [-].
+        uncertainty: Estimate of its own error, relative L2 [-]; 0 while it is pending.
         parts: What each knob has in that.
+        pending: Whether the runs that the estimate takes are still to be made.
     """
 
     text: str
     uncertainty: float
     parts: Mapping[str, float] = field(default_factory=dict)
+    pending: bool = False
 
 
 @dataclass(frozen=True)

@@ -60,8 +60,13 @@ def _slip(study: Study) -> Iterator[str]:
     if seen.own == seen.finest:
         yield f"Slip of the scene as it is: {slip}."
         return
-    doubt = percent(seen.reference.uncertainty)
-    yield f"Slip of the scene as it is: {slip}, {percent(error_of(seen.own))} ± {doubt} off."
+    off = percent(error_of(seen.own))
+    if seen.reference.pending:
+        doubt = "the uncertainty of the reference is not known yet"
+        yield f"Slip of the scene as it is: {slip}, {off} off; {doubt}."
+    else:
+        doubt = percent(seen.reference.uncertainty)
+        yield f"Slip of the scene as it is: {slip}, {off} ± {doubt} off."
     yield from (f"Slip: {sentence}" for sentence in _bottleneck(seen))
 
 
@@ -77,7 +82,7 @@ def _for_target(study: Study, target: float) -> str:
         return f"{percent(target)}: not reached; {text}."
     own = study.own
     ratio = "" if point is own else f", {core_s(point) / core_s(own):.2g} of the scene's own"
-    doubt = f" ± {percent(point.doubt)}" if not point.resolved else ""
+    doubt = f" ± {percent(point.doubt)}" if point.doubt and not point.resolved else ""
     return (
         f"{percent(target)}: cheapest is {point.name}: {percent(error_of(point))}{doubt} at "
         f"{seconds(core_s(point))}{ratio}."

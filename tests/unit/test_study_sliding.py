@@ -11,7 +11,7 @@ from support.sliding import column, slope
 from fenics_hytf.cli.accuracy import closing_words
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import SimulationError, simulate
-from fenics_hytf.study import Processes, conduct, time_domain
+from fenics_hytf.study import BudgetSpent, Processes, Study, StudyError, conduct, time_domain
 from fenics_hytf.study.figure import draw_study
 from fenics_hytf.study.knobs import Knobs
 from fenics_hytf.study.overrides import text_of
@@ -154,7 +154,13 @@ def in_process(job, limit=None) -> Outcome:
 
 def test_a_column_that_slides(monkeypatch, tmp_path, figure):
     monkeypatch.setattr(time_domain, "compare", lambda *_: time_domain.nothing("not here"))
-    study = conduct(small_column(sliding={"time_step": 0.005}), "quadrilateral", in_process)
+    scene, outcomes = small_column(sliding={"time_step": 0.005}), []
+
+    def noted(job, limit=None):
+        outcomes.append(in_process(job, limit))
+        return outcomes[-1]
+
+    study = conduct(scene, "quadrilateral", noted)
     assert study.complete and study.finest is not None
     families = {name for point in study.points for name in point.families}
     assert {"cells", "points", "step", "lapses", "sweep"} - families <= {"points"}
@@ -185,3 +191,25 @@ def test_a_column_that_slides(monkeypatch, tmp_path, figure):
     assert record["slip_reference"]["uncertainty"] == slip.reference.uncertainty
     words = closing_words(study, tmp_path)
     assert slip_table(study) in words and "time step of the slip alone" in slip_table(study)
+    assert "not known yet" not in words
+    # stopped as soon as there is a reference: what that is uncertain by takes further runs
+    stopped = next(filter(None, (stopped_after(scene, outcomes, n) for n in range(len(outcomes)))))
+    words = closing_words(stopped, tmp_path)
+    assert "how uncertain itself is not known yet" in words and "± 0 %" not in words
+    assert "off; the uncertainty of the reference is not known yet." in words
+
+
+def stopped_after(scene: Scene, outcomes: list[Outcome], count: int) -> Study | None:
+    """The study of so many outcomes, or nothing where it measures nothing."""
+    left = iter(outcomes[:count])
+
+    def run(job, limit=None):
+        outcome = next(left, None)
+        if outcome is None:
+            raise BudgetSpent("spent")
+        return outcome
+
+    try:
+        return conduct(scene, "quadrilateral", run)
+    except StudyError:
+        return None
