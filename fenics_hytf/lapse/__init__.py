@@ -36,7 +36,7 @@ from fenics_hytf.lapse.records import (
     SofteningResult,
 )
 from fenics_hytf.lapse.response import Histories, ReceiverProbe, Response, Spectra
-from fenics_hytf.lapse.run import Observer, Solved, solve
+from fenics_hytf.lapse.run import Observer, Solved, asked_residual, solve
 from fenics_hytf.lapse.scheme import HANDOVER, Scheme, scheme_of
 from fenics_hytf.lapse.sliding import Sliding
 from fenics_hytf.lapse.slipped import Slipped, SlipState
@@ -97,6 +97,7 @@ __all__ = [
     "Statics",
     "Unknowns",
     "VolumeError",
+    "asked_residual",
     "cell_stress",
     "choose_continuity",
     "column_supports",

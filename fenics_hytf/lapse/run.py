@@ -49,6 +49,22 @@ _SHARE = 1e-2  # of the last change of the moduli, as a residual
 _BEFORE_GROWTH = 0.1  # e^{−ηT}: on a damped contour the error grows by e^{ηT} within a lapse
 
 
+def asked_residual(tolerance: float, transient: bool, sweep: str) -> float:
+    """What a lapse asks of every line, lest its motion be off by more than a tolerance.
+
+    Args:
+        tolerance: Relative residual of the motion [-].
+        transient: Whether lines lie on a damped contour.
+        sweep: ``direct``, which is as good as it is and only has to show that, or ``reduced``.
+
+    Returns:
+        Relative residual of a line [-].
+    """
+    if sweep == "direct" or not transient:
+        return tolerance
+    return max(_BEFORE_GROWTH * tolerance, min(tolerance, _IN_REACH))
+
+
 @dataclass
 class Tally:
     """What the sweeps of a lapse cost."""
@@ -188,13 +204,10 @@ class _Sweeps:
         self._directions: Columns | None = None  # of the kernel
         self.tally = Tally()
         loop = scene.effects.equivalent_linear
-        self.finest = self._solver.tolerance
+        needed = self._solver.tolerance
         if loop is not None:  # what the strain is off by must not keep the loop from its end
-            needed = max(_SHARE * loop.tolerance, _IN_REACH)
-            self.finest = min(self.finest, needed)
-        self._growth = _BEFORE_GROWTH if excitation.eta else 1.0
-        self.finest = max(self._growth * self.finest, min(self.finest, _IN_REACH))
-        self.tolerance = self.finest
+            needed = min(needed, max(_SHARE * loop.tolerance, _IN_REACH))
+        self.finest = self.tolerance = self._asked(needed)
         self.last: tuple[Response, Material] | None = None
         self.equations: LapseEquations
         wider = _WIDER if equations.across.size > 1 else 1
@@ -208,7 +221,10 @@ class _Sweeps:
     @property
     def tolerance_so_far(self) -> float:
         """What an iteration needs: a hundredth of what the moduli still change by."""
-        return max(self.finest, self._growth * min(_LOOSEST, _SHARE * self._change))
+        return max(self.finest, self._asked(min(_LOOSEST, _SHARE * self._change)))
+
+    def _asked(self, tolerance: float) -> float:
+        return asked_residual(tolerance, self._excitation.eta > 0, self._solver.sweep)
 
     def solve(
         self, moduli: Moduli, iteration: int, tolerance: float | None = None
@@ -291,7 +307,8 @@ class _Sweeps:
 
         sweep: Sweep
         if self._solver.sweep == "direct":
-            sweep = direct_sweep(*arguments, self._solver.tolerance, report, across)
+            asked = self._asked(self._solver.tolerance)
+            sweep = direct_sweep(*arguments, asked, report, across)
         else:
             self.tolerance = self.finest if tolerance is None else tolerance
             reduced = reduced_sweep(

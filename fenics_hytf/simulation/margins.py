@@ -13,6 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fenics_hytf.domain import Domain
+from fenics_hytf.lapse import asked_residual
 from fenics_hytf.scene import ABOVE_BAND, PERIODS, Scene, Solver, motion_band
 
 NEAR_PERIODS = 1.4 * PERIODS
@@ -29,12 +30,10 @@ NEAR_WAVES = 20.0
 """Cells in a shear wave's length below which a mesh that points leave is near the edge [-]."""
 DEFAULT_TOLERANCE = float(Solver.model_fields["tolerance"].default)
 """Residual that a scene asks for by default [-]."""
-OF_TRANSIENT = 0.1
-"""Share of the tolerance that a transient lapse asks for, e^{−ηT}, as errors grow within it [-]."""
 _RESIDUAL = 1e-13
 """Residual over contrast that sweeps leave where stiff ground rides on soft [-].
 
-True solutions in doubles leave up to 1e-14, reduced sweeps ten times that.
+True solutions in doubles leave up to 1e-14, direct sweeps 7 times and reduced ones 10 times that.
 """
 _SAFETY = 3.0
 """Contrast at which sweeps stop over that from which a scene is near the edge [-]."""
@@ -42,17 +41,18 @@ _SAFETY = 3.0
 _MAP = "near the edge of the stability map, demos/{}.png: "
 
 
-def near_contrast(tolerance: float, transient: bool) -> float:
-    """Contrast of shear moduli from which a scene is near the edge.
+def near_contrast(tolerance: float, transient: bool, sweep: str) -> float:
+    """Contrast from which a scene is near the edge.
 
     Args:
-        tolerance: The scene's, of a line's residual [-].
+        tolerance: The scene's [-].
         transient: Whether lapses are.
+        sweep: ``direct`` or ``reduced``.
 
     Returns:
-        [-].
+        Shear modulus of the stiffest ground over that of the softest [-].
     """
-    return tolerance * (OF_TRANSIENT if transient else 1.0) / (_SAFETY * _RESIDUAL)
+    return asked_residual(tolerance, transient, sweep) / (_SAFETY * _RESIDUAL)
 
 
 def edge_notes(scene: Scene, domain: Domain) -> Iterator[str]:
@@ -122,11 +122,12 @@ def _contrast_notes(scene: Scene, soils: tuple[str, ...]) -> Iterator[str]:
     soft, stiff = min(moduli, key=lambda n: moduli[n]), max(moduli, key=lambda n: moduli[n])
     contrast = moduli[stiff] / moduli[soft]
     transient = scene.lapses.continuity == "transient"
-    near = near_contrast(scene.solver.tolerance, transient)
+    sweep = scene.solver.sweep
+    near = near_contrast(scene.solver.tolerance, transient, sweep)
     if contrast >= near:
         yield (
             f"{_MAP.format('stability_contrast')}the shear modulus of {stiff} is {contrast:.2g} "
-            f"times that of {soft}; to {near:.1g} every sweep reaches solver.tolerance = "
+            f"times that of {soft}; to {near:.1g} every {sweep} sweep reaches solver.tolerance = "
             f"{scene.solver.tolerance:g}; beyond, where {stiff} rides on {soft}, it may stop: "
             f"give {stiff} a lower modulus, which moves no less as a rigid body, or raise the "
             "tolerance"

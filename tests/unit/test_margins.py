@@ -114,4 +114,12 @@ def test_large_cells_that_points_may_leave_are_near_the_edge():
 
 def test_the_warning_begins_inside_of_what_is_allowed():
     assert margins.NEAR_PERIODS > PERIODS
-    assert margins.near_contrast(1e-6, True) < margins.near_contrast(1e-6, False)
+    near = margins.near_contrast
+    assert near(1e-6, True, "reduced") < near(1e-6, False, "reduced")
+
+
+@pytest.mark.parametrize(("sweep", "count"), [("reduced", 1), ("direct", 0)])
+def test_direct_sweeps_of_transient_lapses_are_warned_of_no_earlier_than_steady_ones(sweep, count):
+    """A million: a direct sweep reaches what it is asked for, the tolerance itself, to ten."""
+    rock = SAND | {"shear_wave_velocity": 200.0 * 1e3}
+    assert len(edges(scene({"rock": rock}, solver={"sweep": sweep}))) == count

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -336,18 +337,17 @@ def test_cut_cells_with_a_ghost_term_are_sound_at_any_fill(kept, figure):
 
 
 def test_contrasts_short_of_the_warning_are_solved_by_every_sweep(kept, figure):
-    for continuity in ("steady", "transient"):
-        mine = of(kept, CONTRAST, continuity=continuity)
-        near = margins.near_contrast(margins.DEFAULT_TOLERANCE, continuity == "transient")
+    for continuity, sweep in product(("steady", "transient"), ("direct", "reduced")):
+        mine = of(kept, CONTRAST, continuity=continuity, sweep=sweep)
+        near = margins.near_contrast(margins.DEFAULT_TOLERANCE, continuity == "transient", sweep)
         safe = [r for r in mine if float(r.axes["contrast"]) < near]
         assert {r.verdict for r in safe} == {Verdict.CONVERGES}
-        figure(f"kept map, {continuity}, safe contrasts: error", worst(safe), 1e-6)
+        figure(f"kept map, {continuity}, {sweep}, safe contrasts: error", worst(safe), 1e-6)
         beyond = [r for r in mine if float(r.axes["contrast"]) >= 100 * near]
         assert Verdict.STOPS in {r.verdict for r in beyond}
     # The edge goes with the tolerance, as the residual that doubles leave goes with the contrast.
-    assert margins.near_contrast(1e-5, False) == pytest.approx(
-        10 * margins.near_contrast(1e-6, False)
-    )
+    near = margins.near_contrast
+    assert near(1e-5, False, "direct") == pytest.approx(10 * near(1e-6, False, "direct"))
     on_soil = of(kept, CONTRAST, place="rock on soil", damping=0.05)
     floors = {float(r.axes["contrast"]): float(r.figures["floor"] or 0) for r in on_soil}
     assert floors[1e8] / floors[1e4] == pytest.approx(1e4, rel=0.5)
