@@ -305,9 +305,12 @@ def stability(
     force: Annotated[bool, typer.Option("--force", help="Replace maps that are there.")] = False,
     quiet: QuietOption = False,
 ) -> None:
-    """Where the method converges, drifts or blows up: its stability maps."""
+    """Where the method converges, drifts or blows up: its stability maps, in some ten minutes.
+
+    Ctrl-C leaves a table of the runs that are done; figures are drawn at the end.
+    """
     _refuse_mpirun("stability")
-    _leave("stability", RunRequest(Path(), output, force=force, quiet=quiet))
+    _leave("stability", output, force, quiet)
 
 
 def default_folder(scene: Path) -> Path:
@@ -323,7 +326,7 @@ def _refuse_mpirun(command: str) -> None:
         raise typer.Exit(INPUT)
 
 
-def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
+def _leave(command: str, *arguments: Any, **options: Any) -> NoReturn:
     """Check the environment, run a command that solves, and leave with its exit code."""
     from fenics_hytf.cli.environment import environment_faults
     from fenics_hytf.cli.interrupt import interruptible
@@ -340,4 +343,4 @@ def _leave(command: str, request: RunRequest, **options: Any) -> NoReturn:
         "accuracy": accuracy.study_accuracy,
         "stability": stability.map_stability,
     }
-    raise typer.Exit(run.guarded(partial(commands[command], **options), request))
+    raise typer.Exit(run.guarded(partial(commands[command], *arguments, **options)))

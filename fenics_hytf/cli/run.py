@@ -48,7 +48,7 @@ from fenics_hytf.simulation import (
     simulate,
 )
 
-Command = Callable[[RunRequest, MPI.Comm], int]
+Command = Callable[[MPI.Comm], int]
 
 _GO_ON = "A run goes on after its last checkpoint with the same command and --resume"
 _LESS = (
@@ -57,12 +57,11 @@ _LESS = (
 )
 
 
-def guarded(command: Command, request: RunRequest) -> int:
+def guarded(command: Command) -> int:
     """Run a command and turn every way it can end into an exit code (collective).
 
     Args:
-        command: The command.
-        request: What was asked for.
+        command: The command, with all but the communicator.
 
     Returns:
         The exit code.
@@ -70,7 +69,7 @@ def guarded(command: Command, request: RunRequest) -> int:
     comm = MPI.COMM_WORLD
     try:
         with interruptible(comm):
-            return command(request, comm)
+            return command(comm)
     except InputError as error:  # on all ranks alike, as are the next four
         _tell_once(comm, error.faults)
         return INPUT

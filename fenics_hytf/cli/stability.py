@@ -3,24 +3,26 @@
 
 from __future__ import annotations
 
-import typer
+from pathlib import Path
+
 from mpi4py import MPI
 
 from fenics_hytf.cli.accuracy import show_progress
 from fenics_hytf.cli.collective import at_root
-from fenics_hytf.cli.outcome import DONE, InputError, RunRequest
+from fenics_hytf.cli.outcome import DONE, InputError, say
 from fenics_hytf.results import folder_faults, open_result
-from fenics_hytf.study import Axes, StabilityRun, conduct_stability
-from fenics_hytf.study.stability_table import TABLE, summary, write_runs
+from fenics_hytf.study import StabilityRun, StudyCallback, conduct_stability
+from fenics_hytf.study.stability.table import TABLE, summary, write_runs
 
 
-def map_stability(request: RunRequest, comm: MPI.Comm, axes: Axes | None = None) -> int:
+def map_stability(folder: Path, force: bool, quiet: bool, comm: MPI.Comm) -> int:
     """Make the stability maps.
 
     Args:
-        request: The folder; ``force`` replaces maps that are there.
+        folder: Where they go.
+        force: Whether maps that are there are replaced.
+        quiet: No progress, no summary.
         comm: Communicator of one rank.
-        axes: Where the maps are made; everywhere if ``None``.
 
     Returns:
         The exit code.
@@ -29,31 +31,38 @@ def map_stability(request: RunRequest, comm: MPI.Comm, axes: Axes | None = None)
         InputError: If the folder cannot be used; nothing is written then.
         WriteError: If the maps could not be written.
     """
-    faults = folder_faults(request.folder, request.force)
-    table = request.folder / TABLE
-    if not faults and not request.force and table.exists():
+    faults = folder_faults(folder, force)
+    if not faults and not force and (folder / TABLE).exists():
         faults = [
-            f"{request.folder}: found stability maps (it has a {TABLE}); expected a folder without "
-            "them. Choose another with -o, or replace them with --force"
+            f"{folder}: found stability maps (it has a {TABLE}); expected a folder without them. "
+            "Choose another with -o, or replace them with --force"
         ]
     if faults:
         raise InputError(faults)
-    folder = at_root(comm, lambda: open_result(request.folder, request.force))
-    assert folder is not None  # this is the only rank
+    opened = at_root(comm, lambda: open_result(folder, force))
+    assert opened is not None  # this is the only rank
     try:
-        with show_progress(request.quiet) as progress:
-            runs = conduct_stability(axes, progress)
-        drawn = at_root(comm, lambda: _write(request, runs))
+        with show_progress(quiet) as progress:
+            runs = at_root(comm, lambda: _conduct(folder / TABLE, progress)) or []
+        drawn = at_root(comm, lambda: _draw(runs, folder)) or []
     finally:
-        folder.close()
-    if not request.quiet:
-        typer.echo(f"{summary(runs)}\n\n{request.folder}: {', '.join([TABLE, *(drawn or [])])}")
+        opened.close()
+    if not quiet:
+        say(f"{summary(runs)}\n\n{folder}: {', '.join([TABLE, *drawn])}")
     return DONE
 
 
-def _write(request: RunRequest, runs: list[StabilityRun]) -> list[str]:
-    # matplotlib takes half a second to load; only what draws needs it
-    from fenics_hytf.study.stability_figures import draw_stability
+def _conduct(table: Path, progress: StudyCallback | None) -> list[StabilityRun]:
+    """All runs, each in the table as soon as it is done."""
+    runs: list[StabilityRun] = []
+    for found in conduct_stability(progress):
+        write_runs(table, found, append=bool(runs))
+        runs += found
+    return runs
 
-    write_runs(request.folder / TABLE, runs)
-    return draw_stability(runs, request.folder)
+
+def _draw(runs: list[StabilityRun], folder: Path) -> list[str]:
+    # matplotlib takes half a second to load; only what draws needs it
+    from fenics_hytf.study.stability.figures import draw_stability
+
+    return draw_stability(runs, folder)

@@ -17,7 +17,7 @@ from fenics_hytf.simulation.records import (
     Work,
 )
 from fenics_hytf.simulation.room import room_faults
-from fenics_hytf.simulation.stability import factor_of_safety
+from fenics_hytf.simulation.safety import factor_of_safety
 
 __all__ = [
     "CheckpointError",

@@ -20,12 +20,19 @@ NEAR_PERIODS = 1.4 * PERIODS
 """Length of a lapse times the highest frequency below which a scene is near the edge [-].
 
 Columns without damping drift at 5, and are off by 0.2 % of the peak at 10, the rule. From 14 on ηT
-may be larger or smaller by 40 % than that of a run, and all are right to 0.3 %.
+may be smaller by 30 % or larger by 39 % than that of a run, and all are right to 0.3 %.
 """
 NEAR_BAND = 1.4 * ABOVE_BAND
 """Highest frequency over the motion's band below which a scene is near the edge [-]."""
 NEAR_FRACTION = 0.1
 """Share of the shear modulus that is left where lapses begin to pump energy as moduli swing [-]."""
+PUMPED = 2.0
+"""Energy that changes of the moduli bring over that which comes in at the base [-].
+
+With more it is no longer the shaking that moves the ground, be its motion true or not. Within the
+rules, moduli that fall bring up to 1.2, as stress that goes on strains softer ground more; moduli
+that swing to a hundredth and back bring 8 and more.
+"""
 NEAR_WAVES = 20.0
 """Cells in a shear wave's length below which a mesh that points leave is near the edge [-]."""
 DEFAULT_TOLERANCE = float(Solver.model_fields["tolerance"].default)
@@ -38,7 +45,12 @@ True solutions in doubles leave up to 1e-14, direct sweeps 7 times and reduced o
 _SAFETY = 3.0
 """Contrast at which sweeps stop over that from which a scene is near the edge [-]."""
 
-_MAP = "near the edge of the stability map, demos/{}.png: "
+_MAP = "near the edge of the stability map ({}): "
+
+
+def kept_map(name: str) -> str:
+    """Where one of the maps is found, in words for users: ``demos`` travels with the package."""
+    return f"`hytf stability` draws it, kept as demos/stability_{name}.png"
 
 
 def near_contrast(tolerance: float, transient: bool, sweep: str) -> float:
@@ -80,7 +92,7 @@ def _lapse_notes(scene: Scene) -> Iterator[str]:
     length = scene.segments[0].num_samples * scene.dt
     if highest * length < NEAR_PERIODS:
         yield (
-            f"{_MAP.format('stability_lapses')}lapses of {length:g} s hold "
+            f"{_MAP.format(kept_map('lapses'))}lapses of {length:g} s hold "
             f"{highest * length:.3g} periods of the highest line, {highest:.3g} Hz; from "
             f"{NEAR_PERIODS:g} periods on errors stay small whatever the damping: take lapses of "
             f"{NEAR_PERIODS / highest:.3g} s or more"
@@ -88,7 +100,7 @@ def _lapse_notes(scene: Scene) -> Iterator[str]:
     band = motion_band(scene.motion)
     if highest < min(NEAR_BAND * band, nyquist * (1 - 1e-9)):
         yield (
-            f"{_MAP.format('stability_max_frequency')}solver.max_frequency is {highest:.3g} Hz, "
+            f"{_MAP.format(kept_map('max_frequency'))}solver.max_frequency is {highest:.3g} Hz, "
             f"{highest / band:.3g} times the band of the motion; take "
             f"{min(NEAR_BAND * band, nyquist):.3g} Hz or more"
         )
@@ -109,7 +121,7 @@ def _swing_notes(scene: Scene, soils: tuple[str, ...]) -> Iterator[str]:
         left = float(curve.evaluate(strain)[0])
         if left < NEAR_FRACTION:
             yield (
-                f"{_MAP.format('stability_lapses')}soil {name}: at the strain that PGV over the "
+                f"{_MAP.format(kept_map('lapses'))}soil {name}: at the strain that PGV over the "
                 f"shear-wave velocity makes, {100 * strain:.2g} %, {left:.2g} of its modulus is "
                 f"left; moduli that swing to {NEAR_FRACTION:g} and back from lapse to lapse stay "
                 "sound, to less they pump energy: compare with fewer, longer lapses, or with one"
@@ -126,7 +138,7 @@ def _contrast_notes(scene: Scene, soils: tuple[str, ...]) -> Iterator[str]:
     near = near_contrast(scene.solver.tolerance, transient, sweep)
     if contrast >= near:
         yield (
-            f"{_MAP.format('stability_contrast')}the shear modulus of {stiff} is {contrast:.2g} "
+            f"{_MAP.format(kept_map('contrast'))}the shear modulus of {stiff} is {contrast:.2g} "
             f"times that of {soft}; to {near:.1g} every {sweep} sweep reaches solver.tolerance = "
             f"{scene.solver.tolerance:g}; beyond, where {stiff} rides on {soft}, it may stop: "
             f"give {stiff} a lower modulus, which moves no less as a rigid body, or raise the "
@@ -141,7 +153,7 @@ def _cut_notes(scene: Scene, domain: Domain) -> Iterator[str]:
     waves = 1 / max(size) / motion_band(scene.motion) if max(size) else np.inf
     if waves < NEAR_WAVES:
         yield (
-            f"{_MAP.format('stability_cut_cells')}the band of the motion, "
+            f"{_MAP.format(kept_map('cut_cells'))}the band of the motion, "
             f"{motion_band(scene.motion):.3g} Hz, has {waves:.3g} cells in a shear wave's length; "
             f"with {NEAR_WAVES:g} a cell may be filled to any share: take cells "
             f"{NEAR_WAVES / waves:.2g} times as small, or of degree 2"

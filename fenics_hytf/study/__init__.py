@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Accuracy against cost: one scene over its knobs, and the frequency against the time domain.
+"""Accuracy against cost, and stability: what a scene's settings cost, where the method holds.
 
 The work-precision study of numerical analysis (Hairer, Nørsett and Wanner, 1993, §II.10), for one
-scene: what each of its settings costs, and what error it leaves.
+scene over its knobs, with the frequency against the time domain: what each of its settings costs,
+and what error it leaves. Beside it, in ``stability``, maps of where the method converges, drifts or
+blows up, beyond what scenes are allowed.
 """
 
 from fenics_hytf.study.conduct import conduct
@@ -14,10 +16,10 @@ from fenics_hytf.study.records import (
     StudyProgress,
 )
 from fenics_hytf.study.runs import Processes
-from fenics_hytf.study.stability import Axes, StabilityRun, conduct_stability
+from fenics_hytf.study.stability.conduct import conduct_stability
+from fenics_hytf.study.stability.records import StabilityRun
 
 __all__ = [
-    "Axes",
     "BudgetSpent",
     "Processes",
     "StabilityRun",

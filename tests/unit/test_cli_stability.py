@@ -3,13 +3,25 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from fenics_hytf.cli import stability
-from fenics_hytf.study.stability import LAPSES, StabilityRun
-from fenics_hytf.study.stability_verdicts import Verdict
+from fenics_hytf.study import StudyProgress
+from fenics_hytf.study.stability.records import LAPSES, StabilityRun
+from fenics_hytf.study.stability.verdicts import Verdict
 
-WHERE = {"path": "falls", "periods": 10.0, "damping": 0.05, "fraction": 1.0, "decay": 2.3}
+WHERE = {
+    "path": "falls",
+    "lapse_times_max_frequency": 10.0,
+    "damping": 0.05,
+    "modulus_left": 1.0,
+    "eta_lapse": 2.3,
+}
+RUNS = [
+    StabilityRun(LAPSES, WHERE, {"error": 1e-4}, Verdict.CONVERGES, 0.1),
+    StabilityRun(LAPSES, WHERE | {"eta_lapse": 6.9}, {"error": np.inf}, Verdict.BLOWS_UP, 0.1),
+]
 
 
 @pytest.fixture
@@ -25,22 +37,15 @@ def two_runs(monkeypatch):
     """Maps of two runs, made at once."""
     made = []
 
-    def conduct(axes, progress):
-        made.append(axes)
-        if progress is not None:
-            progress(stability_progress())
-        runs = [StabilityRun(LAPSES, WHERE, {"error": 1e-4}, Verdict.CONVERGES, 0.1)]
-        lost = {"error": float("inf")}
-        return [*runs, StabilityRun(LAPSES, WHERE | {"decay": 6.9}, lost, Verdict.BLOWS_UP, 0.1)]
+    def conduct(progress):
+        made.append(progress)
+        for done, run in enumerate(RUNS):
+            if progress is not None:
+                progress(StudyProgress(done, 2, "lapses of 10 periods"))
+            yield [run]
 
     monkeypatch.setattr(stability, "conduct_stability", conduct)
     return made
-
-
-def stability_progress():
-    from fenics_hytf.study import StudyProgress
-
-    return StudyProgress(0, 2, "lapses of 10 periods")
 
 
 def test_maps_are_written_and_told(here, hytf, two_runs):
@@ -90,11 +95,16 @@ def test_under_mpirun_it_is_refused(here, hytf, two_runs, monkeypatch):
     assert code == 2 and "found mpirun" in err and not two_runs
 
 
-def test_interrupted_it_leaves_no_half_of_a_map(here, hytf, monkeypatch):
-    def stopped(axes, progress):
+def test_interrupted_it_leaves_a_table_of_what_is_done_and_no_figure(here, hytf, monkeypatch):
+    """Minutes of runs are not lost, and half a map is not drawn."""
+
+    def stopped(progress):
+        yield RUNS[:1]
         raise KeyboardInterrupt("interrupted")
 
     monkeypatch.setattr(stability, "conduct_stability", stopped)
-    assert hytf("stability")[0] == 130
-    assert not (here / "stability/stability.csv").exists()
-    assert hytf("stability", "--quiet", "--force")[0] == 130
+    for again in ((), ("--quiet", "--force")):
+        assert hytf("stability", *again)[0] == 130
+        assert [path.name for path in (here / "stability").iterdir()] == ["stability.csv"]
+        _, row = (here / "stability/stability.csv").read_text().splitlines()
+        assert row.startswith("lapses,falls,10,")

@@ -7,13 +7,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fenics_hytf.results.report.markup import NOTHING, number, paragraphs, power, section, table
+from fenics_hytf.simulation.margins import PUMPED, kept_map
 
 Summary = Mapping[str, Any]
 
 _ROUNDING = 1e-9  # of the largest energy
-# Energy from changes of moduli over the input: up to 1.2 in the stability map where moduli fall, 8
-# and more where they swing to a hundredth.
-_PUMPED = 2.0
 
 
 def seams_section(summary: Summary, figure: str) -> str:
@@ -53,11 +51,11 @@ def _words(summary: Summary) -> Iterator[str]:
             f", {_share(energy, 'rest')} went into stress that faded after the moduli had changed, "
             f"and jumps at the seams brought {_share(energy, 'seam')}"
         )
-        if energy["seam"] - energy["rest"] > _PUMPED * abs(energy["input"]):
+        if energy["seam"] - energy["rest"] > PUMPED * abs(energy["input"]):
             text += (
                 ". That moduli changed from lapse to lapse has brought far more energy than "
                 "the shaking: moduli that swing so far pump the ground up, beyond the edge of the "
-                "stability map, demos/stability_lapses.png. Compare with fewer, longer lapses"
+                f"stability map ({kept_map('lapses')}). Compare with fewer, longer lapses"
             )
     worst = energy["worst_imbalance"]
     balanced = NOTHING if worst is None else power(worst)

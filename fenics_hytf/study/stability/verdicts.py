@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: MIT
-"""What is made of a run of a stability map: its figures, and which of four verdicts they mean.
+"""What is made of a run of a stability map: its figures, and which of five verdicts they mean.
 
-Every limit stands here once. A run *converges* if nobody who uses it would see its error; it
-*drifts* if it is wrong by more but bounded; it *blows up* if it grows where nothing acts, and
-*stops* if it ends in an error of its own, which names what is wrong.
+A run *converges* if nobody who uses it would see its error; it *drifts* if it is wrong by more but
+bounded; it *pumps* if, right or wrong, it is bounded but gets more energy from changes of its
+moduli than from the shaking; it *blows up* if it grows where nothing acts; and it *stops* if it
+ends in an error of its own, which names what is wrong.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
 
 from fenics_hytf.lapse import Energy
+from fenics_hytf.simulation.margins import PUMPED
 
 RealArray = npt.NDArray[np.float64]
 
@@ -28,15 +29,7 @@ most. Twenty times what tests ask of lapses within the rule.
 SMALL_ENERGY = 2 * SMALL
 """Likewise of the energy ledger, over the energy that came in: energy goes with the square [-]."""
 LARGEST = 2.0
-"""Amplitude over the true one that no error of phase or period explains [-].
-"""
-PUMPED = 2.0
-"""Energy that changes of the moduli bring over that which comes in at the base [-].
-
-With more it is no longer the shaking that moves the ground, be its motion true or not. Moduli that
-fall once bring up to 1.2, as stress that goes on strains softer ground more; moduli that swing to a
-hundredth and back bring 8 and more.
-"""
+"""Amplitude over the true one that no error of phase or period explains [-]."""
 GROWTH = 2.0
 """Growth in still time over the true one, likewise: from its first half to its second [-]."""
 SMALL_RESPONSE = 0.1
@@ -59,29 +52,9 @@ class Verdict(StrEnum):
 
     CONVERGES = "converges"
     DRIFTS = "drifts"
+    PUMPS = "pumps"
     BLOWS_UP = "blows up"
     STOPS = "stops"
-
-
-@dataclass(frozen=True)
-class HistoryFigures:
-    """A motion against the true one.
-
-    Attributes:
-        error: Largest difference over the largest true value [-].
-        amplitude: Largest value over the largest true one [-].
-        growth: From the first to the second half of still time, over that of the true one; what is
-            smaller than :data:`SMALL` of the peak counts as that [-].
-        pumped: Largest sum of what changes of the moduli have brought, at seams and as the rest of
-            stress that they leave fades, over the energy that came in [-].
-        imbalance: Largest sum of what the energy ledgers lack, likewise [-].
-    """
-
-    error: float
-    amplitude: float
-    growth: float
-    pumped: float
-    imbalance: float
 
 
 def measure_history(
@@ -89,8 +62,8 @@ def measure_history(
     true: RealArray,
     still: int,
     ledgers: Sequence[Energy] = (),
-) -> HistoryFigures:
-    """Measure a motion.
+) -> dict[str, float]:
+    """Measure a motion against the true one.
 
     Args:
         found: The motion [m], shape ``(num_places, num_samples)``.
@@ -99,16 +72,25 @@ def measure_history(
         ledgers: Energy of the lapses.
 
     Returns:
-        The figures; infinite where the motion is not finite.
+        Figures [-], infinite where the motion is not finite: ``error``, the largest difference over
+        the largest true value; ``amplitude_over_true``, of the largest values;
+        ``growth_over_true``, of the growth from the first to the second half of still time, where
+        what is smaller than :data:`SMALL` of the peak counts as that; ``energy_of_changes``, the
+        largest sum of what changes of the moduli have brought, at seams and as the rest of stress
+        that they leave fades, over the energy that came in; ``energy_imbalance``, the largest sum
+        of what the energy ledgers lack, likewise.
     """
+    figures = ("error", "amplitude_over_true", "growth_over_true")
+    energies = ("energy_of_changes", "energy_imbalance")
+    if not np.isfinite(found).all():
+        return dict.fromkeys((*figures, *energies), np.inf)
     peak = float(np.abs(true).max())
     with np.errstate(over="ignore", invalid="ignore"):
-        if not np.isfinite(found).all():
-            return HistoryFigures(*[np.inf] * 5)
         error, largest = float(np.abs(found - true).max()), float(np.abs(found).max())
         growth = _growth(found, still, SMALL * peak) / _growth(true, still, SMALL * peak)
-        pumped, lacking = _pumped_and_lacking(ledgers)
-    return HistoryFigures(error / peak, largest / peak, growth, pumped, lacking)
+        brought, lacking = _brought_and_lacking(ledgers)
+    values = (error / peak, largest / peak, growth, brought, lacking)
+    return dict(zip((*figures, *energies), values, strict=True))
 
 
 def _growth(motion: RealArray, still: int, least: float) -> float:
@@ -117,7 +99,7 @@ def _growth(motion: RealArray, still: int, least: float) -> float:
     return float(max(second.max(), least) / max(first.max(), least))
 
 
-def _pumped_and_lacking(ledgers: Sequence[Energy]) -> tuple[float, float]:
+def _brought_and_lacking(ledgers: Sequence[Energy]) -> tuple[float, float]:
     if not ledgers:
         return 0.0, 0.0
     come = sum(abs(ledger.input) for ledger in ledgers)
@@ -126,19 +108,20 @@ def _pumped_and_lacking(ledgers: Sequence[Energy]) -> tuple[float, float]:
     return float(brought / come), float(lacking / come)
 
 
-def judge_history(figures: HistoryFigures) -> Verdict:
+def judge_history(figures: Mapping[str, float]) -> Verdict:
     """Judge a motion.
 
     Args:
-        figures: Its figures.
+        figures: Those of :func:`measure_history`.
 
     Returns:
         The verdict.
     """
-    bounded = figures.amplitude <= LARGEST and figures.growth <= GROWTH
-    if not bounded or figures.pumped > PUMPED:
+    if not (figures["amplitude_over_true"] <= LARGEST and figures["growth_over_true"] <= GROWTH):
         return Verdict.BLOWS_UP
-    good = figures.error <= SMALL and figures.imbalance <= SMALL_ENERGY
+    if figures["energy_of_changes"] > PUMPED:
+        return Verdict.PUMPS
+    good = figures["error"] <= SMALL and figures["energy_imbalance"] <= SMALL_ENERGY
     return Verdict.CONVERGES if good else Verdict.DRIFTS
 
 

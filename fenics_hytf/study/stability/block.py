@@ -9,19 +9,22 @@ without.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import eigh
 
 from fenics_hytf.domain import Domain
 from fenics_hytf.lapse import Filling, FillingSurvey
 from fenics_hytf.operators import GhostForm
 from fenics_hytf.particles import Points, move
 from fenics_hytf.scene import Scene
-from fenics_hytf.study.stability_ground import Response, Site
+from fenics_hytf.study.stability.ground import ScipySystem, Site
+from fenics_hytf.study.stability.records import BLOCK, Axes, Job, Row
+from fenics_hytf.study.stability.verdicts import judge_response
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -34,19 +37,51 @@ _MOTION = {
 }
 
 
-@dataclass(frozen=True)
-class BlockFigures:
-    """A cut block at one frequency.
+def block_jobs(
+    fill: Sequence[float] = (1.0, 0.9, 0.75, 0.5, 0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4, 1e-6),
+    waves: Sequence[float] = (120.0, 80.0, 50.0, 30.0, 20.0, 15.0, 12.0, 10.0, 8.0, 6.0),
+) -> Iterator[Job]:
+    """Fill × frequency, with the ghost term and without.
 
-    Attributes:
-        error: Largest difference of displacement from the fitted mesh over the largest there [-].
-        amplitude: Largest displacement over the largest there [-].
-        condition: Condition number of A [-].
+    Args:
+        fill: Share of the last cells that is filled [-].
+        waves: Cells in the length of a shear wave [-].
+
+    Yields:
+        The runs that differ in frequency alone.
     """
+    for share, ghost in product(fill, (True, False)):
+        text = f"cut cells, {100 * share:g} % filled, {'with' if ghost else 'without'} ghost term"
+        yield Job(BLOCK, text, len(waves), partial(_runs, share, waves, ghost))
 
-    error: float
-    amplitude: float
-    condition: float
+
+def _runs(fill: float, waves: Sequence[float], ghost: bool) -> Iterator[Row]:
+    size = (SIDE - 1 + fill) * CELL
+    with Site(_scene(size)) as fitted, Site(_scene(None), fill=_squeeze(fill, ghost)) as cut:
+        true, found = ScipySystem(fitted), ScipySystem(cut)
+    fitting = [true.at_receivers(_frequency(number)) for number in waves]
+    return (_run(fill, number, ghost, found, u) for number, u in zip(waves, fitting, strict=True))
+
+
+def _run(fill: float, waves: float, ghost: bool, found: ScipySystem, true: ComplexArray) -> Row:
+    """A block at one frequency, against the displacement on the mesh that fits it."""
+    s = _frequency(waves)
+    u, largest = found.at_receivers(s), float(np.abs(true).max())
+    error, amplitude = float(np.abs(u - true).max()) / largest, float(np.abs(u).max()) / largest
+    condition = float(np.linalg.cond(found.matrix(s).toarray()))
+    axes: Axes = {
+        "ghost": "yes" if ghost else "no",
+        "fill": fill,
+        "cells_a_wavelength": waves,
+        "frequency_hz": s.imag / (2 * np.pi),
+    }
+    figures = {"error": error, "amplitude_over_true": amplitude, "condition": condition}
+    return axes, figures, judge_response(error, amplitude, condition)
+
+
+def _frequency(waves: float) -> complex:
+    """The complex frequency at so many cells in a shear wave's length [rad/s]."""
+    return 2j * np.pi * SPEED / (CELL * waves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,40 +89,8 @@ class Unheld(Filling):
     """Loose cells without a ghost term."""
 
     def ghost(self, domain: Domain, strength: float | None = None) -> GhostForm | None:
-        """None."""
+        """No ghost form, whatever the strength."""
         return None
-
-
-def first_frequency() -> float:
-    """Lowest natural frequency of the whole block [Hz]."""
-    with Site(_scene(SIDE * CELL)) as site:
-        response = Response(site)
-        K, M = (response.part(i).toarray().real for i in (0, -1))
-    return float(np.sqrt(eigh(K, M, eigvals_only=True)[0]) / (2 * np.pi))
-
-
-def cut_block(fraction: float, waves: tuple[float, ...], ghost: bool) -> list[BlockFigures]:
-    """Hold a cut block against one that its mesh fits.
-
-    Args:
-        fraction: Of the last cells that is filled [-].
-        waves: Frequencies, as cells in a shear wave's length [-].
-        ghost: Whether there is a ghost term.
-
-    Returns:
-        The figures at each.
-    """
-    size = (SIDE - 1 + fraction) * CELL
-    with Site(_scene(size)) as fitted, Site(_scene(None), fill=_squeeze(fraction, ghost)) as cut:
-        true, found = Response(fitted), Response(cut)
-    figures = []
-    for number in waves:
-        s = 2j * np.pi * SPEED / (CELL * number)
-        expected, condition = true.at_receivers(s), np.linalg.cond(found.matrix(s).toarray())
-        u, largest = found.at_receivers(s), float(np.abs(expected).max())
-        off, amplitude = float(np.abs(u - expected).max()), float(np.abs(u).max())
-        figures.append(BlockFigures(off / largest, amplitude / largest, float(condition)))
-    return figures
 
 
 def _scene(size: float | None) -> Scene:

@@ -4,7 +4,7 @@
 The column is marched lapse by lapse with the very hand-over of a run. What a scene refuses, lapses
 too short and lines cut too low, is computed here all the same, for lapses are cut, and contours
 made, without asking the rules. Moduli are imposed, lapse by lapse, so that the true motion is known
-(:mod:`fenics_hytf.study.stability_reference`).
+(:mod:`fenics_hytf.study.stability.reference`).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from fenics_hytf.lapse import (
 )
 from fenics_hytf.motion import Contour, Segment, energy_band, synthetic
 from fenics_hytf.scene import Scene
-from fenics_hytf.study.stability_ground import Site
+from fenics_hytf.study.stability.ground import Site
 
 RealArray = npt.NDArray[np.float64]
 
@@ -55,7 +55,7 @@ _MOTION: dict[str, Any] = {  # 0.5 to 6 Hz, strong from 1.5 to 5 s
 
 
 @cache
-def motion_band() -> float:
+def _motion_band() -> float:
     """Frequency below which the motion has 99 % of its energy [Hz]."""
     return energy_band(synthetic(**_MOTION).acceleration[None], _DT)
 
@@ -85,7 +85,7 @@ class ColumnCase:
         """The column as a scene of one lapse, which no rule on lapses forbids."""
         ground = {"density": 1800.0, "shear_wave_velocity": SPEED, "poisson": 0.3}
         law = {"complex_modulus": "maxwell", "reference_frequency": 2.0}
-        cut = {} if self.above_band is None else {"max_frequency": self.above_band * motion_band()}
+        cut = {} if self.above_band is None else {"max_frequency": self.above_band * _motion_band()}
         heights = np.linspace(0.0, HEIGHT, CELLS + 1)
         layer = {"thickness": HEIGHT, "soil": "soil", "cells": CELLS}
         return Scene.from_dict(
@@ -108,7 +108,7 @@ class ColumnCase:
     @property
     def cut_above_band(self) -> float:
         """It over the frequency below which the motion has 99 % of its energy [-]."""
-        return self.max_frequency / motion_band()
+        return self.max_frequency / _motion_band()
 
     @property
     def length(self) -> int:

@@ -21,8 +21,8 @@ from scipy.linalg import expm
 
 from fenics_hytf.lapse.carried import FADING
 from fenics_hytf.motion import band_limited
-from fenics_hytf.study.stability_column import ColumnCase
-from fenics_hytf.study.stability_ground import Site, csr
+from fenics_hytf.study.stability.column import ColumnCase
+from fenics_hytf.study.stability.ground import Site, csr
 
 RealArray = npt.NDArray[np.float64]
 

@@ -88,8 +88,8 @@ class Site:
         return constrained_rows(self.domain, local, self.equations.T)
 
 
-class Response:
-    """Responses of a site at single frequencies, solved without the package's sweeps.
+class ScipySystem:
+    """A site's equations at single frequencies, for scipy in place of the package's sweeps.
 
     Args:
         site: The site.
@@ -107,10 +107,6 @@ class Response:
     def matrix(self, s: complex) -> sparse.csr_matrix:
         """A(s)."""
         return sum(function(s) * matrix for matrix, function in self._terms)
-
-    def part(self, number: int) -> sparse.csr_matrix:
-        """One of the matrices that A(s) is a sum of: stiffness first, mass last."""
-        return self._terms[number][0]
 
     def at_receivers(self, s: complex) -> ComplexArray:
         """Displacement of the receivers for a unit of base acceleration, shape ``(n,)``."""

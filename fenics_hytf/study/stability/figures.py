@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,19 +28,12 @@ from fenics_hytf.results.figures.style import (
 )
 from fenics_hytf.scene import ABOVE_BAND, PERIODS
 from fenics_hytf.simulation import margins
-from fenics_hytf.study.stability import (
-    BLOCK,
-    CONTRAST,
-    DEFAULT_DECAY,
-    FREQUENCY,
-    LAPSES,
-    StabilityRun,
-)
-from fenics_hytf.study.stability_table import counted
-from fenics_hytf.study.stability_verdicts import (
+from fenics_hytf.study.stability.lapses import DEFAULT_DECAY
+from fenics_hytf.study.stability.records import BLOCK, CONTRAST, FREQUENCY, LAPSES, StabilityRun
+from fenics_hytf.study.stability.table import counted
+from fenics_hytf.study.stability.verdicts import (
     GROWTH,
     LARGEST,
-    PUMPED,
     SINGULAR,
     SMALL,
     SMALL_ENERGY,
@@ -58,12 +51,16 @@ FIGURES = {
 _MARKS = {  # marker, colour, filled, size
     Verdict.CONVERGES: ("o", "#56B4E9", True, 5.0),
     Verdict.DRIFTS: ("^", "#D55E00", False, 6.0),
+    Verdict.PUMPS: ("D", "#7B3294", False, 5.5),
     Verdict.BLOWS_UP: ("X", INK, True, 7.0),
     Verdict.STOPS: ("s", QUIET, False, 6.0),
 }
 _DOTTED = (0, (1, 2))
 _DOT = "dotted: where hytf check begins to warn"
 
+_LENGTH = "lapse_times_max_frequency"
+
+_Kind = tuple[str, float, float]  # of a column: path of its moduli, damping, modulus left
 _Where = Callable[[StabilityRun], tuple[float, float]]
 
 
@@ -95,63 +92,67 @@ def draw_stability(runs: Sequence[StabilityRun], folder: Path) -> list[str]:
 
 def lapse_map(runs: Sequence[StabilityRun]) -> Figure:
     """Length × ηT, a panel for each damping and each fraction of the moduli that is left."""
-    rows = sorted({(str(r.axes["path"]), _number(r, "damping")) for r in runs})
-    columns = max(len({_number(r, "fraction") for r in _of(runs, path=p)}) for p, _ in rows)
-    figure = Figure(figsize=(3.0 * columns + 0.6, 2.35 * len(rows) + 1.5))
-    panels = figure.subplots(len(rows), columns, squeeze=False)
-    for line, (path, damping) in zip(panels, rows, strict=True):
-        fractions = sorted(
-            {_number(r, "fraction") for r in _of(runs, path=path, damping=damping)}, reverse=True
-        )
-        for axes, fraction in zip(line, fractions, strict=False):
-            here = _of(runs, path=path, damping=damping, fraction=fraction)
-            _scatter(axes, here, lambda r: (_number(r, "periods"), _number(r, "decay")))
-            _rule(axes, PERIODS, margins.NEAR_PERIODS)
-            axes.axhline(DEFAULT_DECAY, color=INK, linewidth=0.9, linestyle=DASHED, zorder=1)
-            _logarithmic(axes, "x", {_number(r, "periods") for r in here})
-            _logarithmic(axes, "y", {_number(r, "decay") for r in here})
-            _leave_room(axes)
-            axes.set_title(f"damping {100 * damping:g} %, {_fate(path, fraction)}", fontsize=9)
-        for axes in line[len(fractions) :]:
-            axes.set_visible(False)
-        line[0].set_ylabel("ηT of the contour [-]")
-    for axes in panels[-1]:
-        axes.set_xlabel("Lapse × highest frequency [-]")
+    lines = sorted({_kind(run)[:2] for run in runs})
+    panels = [[kind for kind in _kinds(runs) if kind[:2] == line] for line in lines]
+    figure, drawn = _column_map(runs, panels, "eta_lapse", "ηT of the contour [-]")
+    for axes in drawn:
+        axes.axhline(DEFAULT_DECAY, color=INK, linewidth=0.9, linestyle=DASHED, zorder=1)
     verdict = (
         f"converges: displacement within {100 * SMALL:g} % of the true peak, energy within "
-        f"{100 * SMALL_ENERGY:g} %\nblows up: {LARGEST:g} times as large as true, growing "
-        f"{GROWTH:g}-fold in still time, or with {PUMPED:g} times the input's energy from "
-        "changes of moduli"
+        f"{100 * SMALL_ENERGY:g} %; blows up: {LARGEST:g} times as large as true, or growing "
+        f"{GROWTH:g}-fold in still time\npumps: changes of moduli bring more than "
+        f"{margins.PUMPED:g} times the energy that the shaking puts in, be the motion right or not"
     )
     text = f"A column in lapses, cut at twice the band of its motion\n{verdict}"
-    lines = f"shaded: refused; {_DOT}; dashed: ηT of a run"
-    return _finished(figure, runs, text, lines)
+    return _finished(figure, runs, text, f"shaded: refused; {_DOT}; dashed: ηT of a run")
 
 
 def frequency_map(runs: Sequence[StabilityRun]) -> Figure:
     """Length × highest frequency, a panel for each damping and fraction."""
-    kinds = sorted({(_number(r, "damping"), -_number(r, "fraction")) for r in runs})
-    figure = Figure(figsize=(3.0 * len(kinds) + 0.6, 4.3))
-    for axes, (damping, less) in zip(
-        figure.subplots(1, len(kinds), squeeze=False)[0], kinds, strict=True
-    ):
-        here = _of(runs, damping=damping, fraction=-less)
-        _scatter(axes, here, lambda r: (_number(r, "periods"), _number(r, "above_band")))
-        _rule(axes, PERIODS, margins.NEAR_PERIODS)
-        _logarithmic(axes, "x", {_number(r, "periods") for r in here})
-        _logarithmic(axes, "y", {_number(r, "above_band") for r in here})
-        _leave_room(axes)
+    y = "max_frequency_over_band"
+    figure, drawn = _column_map(runs, [_kinds(runs)], y, "Highest frequency over band [-]")
+    for axes in drawn:
         axes.axhline(margins.NEAR_BAND, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
         axes.axhspan(axes.get_ylim()[0], ABOVE_BAND * 0.97, color=QUIET, alpha=0.13, lw=0)
-        axes.set_title(f"damping {100 * damping:g} %, {_fate('falls', -less)}", fontsize=9)
-        axes.set_xlabel("Lapse × highest frequency [-]")
-        if axes.get_subplotspec().is_first_col():
-            axes.set_ylabel("Highest frequency over band [-]")
     text = (
         f"A column in lapses at the ηT of a run, {DEFAULT_DECAY:g}\nthe topmost row has all lines "
         "that samples hold, as a scene without solver.max_frequency"
     )
     return _finished(figure, runs, text, f"shaded: refused; {_DOT}")
+
+
+def _kind(run: StabilityRun) -> _Kind:
+    return str(run.axes["path"]), _number(run, "damping"), _number(run, "modulus_left")
+
+
+def _kinds(runs: Sequence[StabilityRun]) -> list[_Kind]:
+    """Kinds of columns: the path of the moduli, the damping, and fractions from large to small."""
+    return sorted({_kind(run) for run in runs}, key=lambda kind: (*kind[:2], -kind[2]))
+
+
+def _column_map(
+    runs: Sequence[StabilityRun], panels: Sequence[Sequence[_Kind]], y: str, label: str
+) -> tuple[Figure, list[Axes]]:
+    """Length × what is on the other axis, a panel for each kind of column."""
+    width = max(len(line) for line in panels)
+    figure = Figure(figsize=(3.0 * width + 0.6, 2.35 * len(panels) + 1.95))
+    grid, drawn = figure.subplots(len(panels), width, squeeze=False), []
+    for row, line in zip(grid, panels, strict=True):
+        for axes, (path, damping, left) in zip(row, line, strict=False):
+            here = _of(runs, path=path, damping=damping, modulus_left=left)
+            _scatter(axes, here, lambda r: (_number(r, _LENGTH), _number(r, y)))
+            _rule(axes, PERIODS, margins.NEAR_PERIODS)
+            _logarithmic(axes, "x", {_number(r, _LENGTH) for r in here})
+            _logarithmic(axes, "y", {_number(r, y) for r in here})
+            _leave_room(axes)
+            axes.set_title(f"damping {100 * damping:g} %, {_fate(path, left)}", fontsize=9)
+            drawn.append(axes)
+        for axes in row[len(line) :]:
+            axes.set_visible(False)
+        row[0].set_ylabel(label)
+    for axes in grid[-1]:
+        axes.set_xlabel("Lapse × highest frequency [-]")
+    return figure, drawn
 
 
 def block_map(runs: Sequence[StabilityRun]) -> Figure:
@@ -161,10 +162,14 @@ def block_map(runs: Sequence[StabilityRun]) -> Figure:
     fills = sorted({_number(r, "fill") for r in runs}, reverse=True)
     for axes, ghost in zip(panels, ("yes", "no"), strict=False):
         here = _of(runs, ghost=ghost)
-        _scatter(axes, here, lambda r: (fills.index(_number(r, "fill")), _number(r, "waves")))
+        _scatter(
+            axes,
+            here,
+            lambda r: (fills.index(_number(r, "fill")), _number(r, "cells_a_wavelength")),
+        )
         axes.set_title("with the ghost term, as runs have it" if ghost == "yes" else "without it")
         axes.axhline(margins.NEAR_WAVES, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
-        _logarithmic(axes, "y", {_number(r, "waves") for r in here})
+        _logarithmic(axes, "y", {_number(r, "cells_a_wavelength") for r in here})
         _leave_room(axes)
         axes.set_xlim(-0.6, len(fills) - 0.4)
         axes.set_xticks(range(len(fills)), [f"{100 * fill:g}" for fill in fills], rotation=45)
@@ -197,11 +202,15 @@ def block_map(runs: Sequence[StabilityRun]) -> Figure:
 
 
 def contrast_map(runs: Sequence[StabilityRun]) -> Figure:
-    """Contrast × damping, a panel for each place of the stiff ground; and the residuals."""
+    """Contrast × damping, a panel for each place of the stiff ground; and the residuals.
+
+    A mark is the worst of its four runs.
+    """
     places = list(dict.fromkeys(str(r.axes["place"]) for r in runs))
     figure = Figure(figsize=(3.4 * (len(places) + 1) + 0.4, 4.9))
     panels = figure.subplots(1, len(places) + 1, squeeze=False)[0]
     near = margins.near_contrast(margins.DEFAULT_TOLERANCE, True, "reduced")  # it asks for most
+    drawn: list[StabilityRun] = []
     for axes, place in zip(panels, places, strict=False):
         here = _of(runs, place=place)
         dampings = sorted({_number(r, "damping") for r in here})
@@ -210,7 +219,9 @@ def contrast_map(runs: Sequence[StabilityRun]) -> Figure:
         def where(run: StabilityRun, number: dict[float, int] = number) -> tuple[float, float]:
             return _number(run, "contrast"), number[_number(run, "damping")]
 
-        _scatter(axes, _worst(here, where), where)
+        worst = _worst(here, where)
+        drawn += worst
+        _scatter(axes, worst, where)
         axes.set_yticks(range(len(dampings)), [f"{100 * d:g} %" for d in dampings])
         axes.set_ylim(-0.6, len(dampings) - 0.4)
         axes.axvline(near, color=INK, linewidth=1.1, linestyle=_DOTTED, zorder=1)
@@ -226,7 +237,8 @@ def contrast_map(runs: Sequence[StabilityRun]) -> Figure:
         f"converges: the residual asked for is reached, and solutions are within "
         f"{100 * SMALL_SOLUTION:g} %; stops: the sweep refuses the line, exit code 3"
     )
-    return _finished(figure, runs, text, f"{_DOT} of transient, reduced ones, at the default tolerance")
+    lines = f"{_DOT} of transient lapses with reduced sweeps, at the default tolerance"
+    return _finished(figure, drawn, text, lines)
 
 
 def _conditions(axes: Axes, runs: Sequence[StabilityRun], ghost: bool) -> None:
@@ -247,7 +259,7 @@ def _residuals(axes: Axes, runs: Sequence[StabilityRun], places: Sequence[str]) 
     for place, colour, marker in zip(places, COLOURS, "osD", strict=False):
         contrasts = sorted({_number(r, "contrast") for r in _of(runs, place=place)})
         floor = [
-            max(r.figures["floor"] or 0.0 for r in _of(runs, place=place, contrast=c))
+            max(r.figures["residual_floor"] or 0.0 for r in _of(runs, place=place, contrast=c))
             for c in contrasts
         ]
         axes.plot(contrasts, floor, color=colour, marker=marker, markersize=5, label=place)
@@ -265,24 +277,28 @@ def _residuals(axes: Axes, runs: Sequence[StabilityRun], places: Sequence[str]) 
     axes.set_yscale("log")
     axes.set_ylabel("Residual of true solutions in doubles [-]")
     axes.set_title("what no sweep can beat")
-    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.78))
+    axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.66))
 
 
 def _scatter(axes: Axes, runs: Sequence[StabilityRun], where: _Where) -> None:
-    for verdict, (marker, colour, filled, size) in _MARKS.items():
+    for verdict in _MARKS:
         mine = [where(run) for run in runs if run.verdict == verdict]
         if mine:
-            axes.plot(
-                *zip(*mine, strict=True),
-                linestyle="none",
-                marker=marker,
-                color=colour,
-                markersize=size,
-                markerfacecolor=colour if filled else "white",
-                markeredgecolor=colour if verdict != Verdict.CONVERGES else COLOURS[0],
-                markeredgewidth=0.7 if filled else 1.4,
-                zorder=4,
-            )
+            axes.plot(*zip(*mine, strict=True), zorder=4, **_mark(verdict))
+
+
+def _mark(verdict: Verdict) -> dict[str, Any]:
+    """How it is drawn."""
+    marker, colour, filled, size = _MARKS[verdict]
+    return {
+        "linestyle": "none",
+        "marker": marker,
+        "color": colour,
+        "markersize": size,
+        "markerfacecolor": colour if filled else "white",
+        "markeredgecolor": colour if verdict != Verdict.CONVERGES else COLOURS[0],
+        "markeredgewidth": 0.7 if filled else 1.4,
+    }
 
 
 def _worst(runs: Sequence[StabilityRun], where: _Where) -> list[StabilityRun]:
@@ -327,21 +343,9 @@ def _finished(figure: Figure, runs: Sequence[StabilityRun], text: str, lines: st
     title, _, small = text.partition("\n")
     figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
     handles = []
-    for verdict, (marker, colour, filled, size) in _MARKS.items():
-        words = counted([run for run in runs if run.verdict == verdict])
-        if words:
-            handles.append(
-                figure.axes[0].plot(
-                    [],
-                    [],
-                    linestyle="none",
-                    marker=marker,
-                    color=colour,
-                    markersize=size + 1,
-                    markerfacecolor=colour if filled else "white",
-                    label=words[0],
-                )[0]
-            )
+    for verdict in _MARKS:
+        for words in counted([run for run in runs if run.verdict == verdict]):
+            handles += figure.axes[0].plot([], [], label=words, **_mark(verdict))
     figure.legend(
         handles=handles,
         loc="outside lower left",
