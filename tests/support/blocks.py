@@ -18,6 +18,7 @@ from fenics_hytf.domain import build, facet_cells
 from fenics_hytf.lapse import Equations, Filling, FillingSurvey, material, seed_points, survey
 from fenics_hytf.operators import GhostForm, InternalForce, strain_rows
 from fenics_hytf.particles import Points, gradient_matrices, move
+from fenics_hytf.study.stability.ground import csr
 from support.meshes import scene
 
 SELF = MPI.COMM_SELF
@@ -173,11 +174,6 @@ class Ground:
     def by_points(self) -> np.ndarray:
         """What the points of all cells would, without a ghost term."""
         return self.stiffness(self.points, self.points.volume)
-
-
-def csr(matrix) -> sparse.csr_matrix:
-    start, columns, values = matrix.getValuesCSR()
-    return sparse.csr_matrix((values.copy(), columns, start), shape=matrix.getSize())
 
 
 def condition(A: np.ndarray, norm: int = 2) -> float:

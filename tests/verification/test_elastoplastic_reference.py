@@ -19,6 +19,7 @@ from fenics_hytf.motion import recorded
 from fenics_hytf.study.elastoplastic import NoEquilibrium, Section, elastoplastic_slope
 from fenics_hytf.study.sliding_column import Column, elastoplastic_column
 from fenics_hytf.study.sliding_slope import MOTIONS, reference_motion, reference_slope
+from fenics_hytf.study.stability.ground import csr
 
 G = 9.81
 RECORDS = {
@@ -127,8 +128,7 @@ def test_elastic_stiffness_is_that_of_the_forms(b_bar):
     def assembled(form) -> sparse.csr_matrix:
         A = assemble_matrix(fem.form(form))
         A.assemble()
-        start, columns, values = A.getValuesCSR()
-        result = sparse.csr_matrix((values.real, columns, start), A.getSize())
+        result = csr(A).real
         A.destroy()
         return result
 

@@ -19,6 +19,7 @@ from fenics_hytf.domain import build
 from fenics_hytf.lapse import Equations, material, seed_points, survey
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import simulate
+from fenics_hytf.study.stability.ground import csr
 
 PLACES = {
     "crest_mid": [0.0, 30.0],
@@ -94,9 +95,9 @@ def test_transfer_functions(name, limit, case, tmp_path, figure):
 
 def real(matrix) -> csr_matrix:
     """A PETSc matrix that is real."""
-    indptr, indices, values = matrix.getValuesCSR()
-    assert not values.imag.any()
-    return csr_matrix((values.real.copy(), indices, indptr))
+    values = csr(matrix)
+    assert not values.data.imag.any()
+    return values.real
 
 
 def test_natural_frequencies(case, tmp_path, figure):

@@ -25,6 +25,7 @@ from fenics_hytf.lapse.unknowns import Unknowns
 from fenics_hytf.motion import recorded
 from fenics_hytf.operators.quadrature import gauss_sites
 from fenics_hytf.particles import transfer_matrix
+from fenics_hytf.study.stability.ground import csr
 
 WORLD, SELF = MPI.COMM_WORLD, MPI.COMM_SELF
 ROLLERS = {"base": "fixed", "left": "roller", "right": "roller"}
@@ -389,8 +390,7 @@ def motions() -> dict[str, tuple[np.ndarray, float]]:
 
 
 def csc(matrix: PETSc.Mat) -> sparse.csc_matrix:
-    indptr, indices, values = matrix.getValuesCSR()
-    return sparse.csr_matrix((values.real, indices, indptr), matrix.getSize()).tocsc()
+    return csr(matrix).real.tocsc()
 
 
 def driving_peak(slope: Ground, found: Mechanism, drive: np.ndarray, dt: float) -> float:
