@@ -12,7 +12,8 @@ from fenics_hytf.scene.faults import Fault, join_key, name_key, toml_text
 from fenics_hytf.scene.table import Count, Several, Table, read_table
 
 _KEY = "output"
-_RECEIVER_NAME = re.compile(r"[\w-]+")
+_LONGEST = 50  # letters of up to four bytes, and what else is in a file's name of 255 bytes
+_RECEIVER_NAME = re.compile(rf"[\w-]{{1,{_LONGEST}}}")
 
 
 class Receiver(Table):
@@ -33,8 +34,8 @@ class Output(Table):
     """What is written.
 
     Attributes:
-        receivers: By name. Names become columns such as ``NAME.u_x``, so they are made of
-            letters, digits, ``_`` and ``-``.
+        receivers: By name. Names become columns such as ``NAME.u_x`` and files of ``hytf export``,
+            so they are made of at most 50 letters, digits, ``_`` and ``-``.
         fields: Whether nodal fields are written.
         every: Snapshots every so many lapses.
         water_table: Elevation of the water table [m], for effective vertical stress; or ``None``:
@@ -74,7 +75,8 @@ def read_output(
             expected = "another name: so the motions of the base are called in exports"
             faults.append(Fault(where, toml_text(name), expected))
         if not _RECEIVER_NAME.fullmatch(str(name)):
-            faults.append(Fault(where, toml_text(name), "a name of letters, digits, _ and - only"))
+            expected = f"a name of letters, digits, _ and - only, at most {_LONGEST} of them"
+            faults.append(Fault(where, toml_text(name), expected))
         receiver, found = _read_receiver(place, where)
         faults += found
         if receiver is not None:
