@@ -150,7 +150,8 @@ def _cut_notes(scene: Scene, domain: Domain) -> Iterator[str]:
     """Cells that points leave in part, too large for the waves of the motion."""
     degree = domain.V.ufl_element().degree
     size = domain.comm.allgather(_largest(scene, domain) / degree)
-    waves = 1 / max(size) / motion_band(scene.motion) if max(size) else np.inf
+    crossing = max(size) * motion_band(scene.motion)  # waves in a cell; none where nothing moves
+    waves = 1 / crossing if crossing else np.inf
     if waves < NEAR_WAVES:
         yield (
             f"{_MAP.format(kept_map('cut_cells'))}the band of the motion, "

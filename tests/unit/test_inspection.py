@@ -192,6 +192,22 @@ def test_notes(case, words):
     assert all(note.startswith(word) for note, word in zip(notes, words, strict=True))
 
 
+def test_a_motion_that_rests_is_no_matter():
+    """Its band is nought; naively the length of its waves divides by that, in cut cells too."""
+    wave = {"amplitude": 0.0, "frequency": 1.0, "cycles": 2, "samples": 32}
+    box = {"size": [4.0, 8.0], "cells": [1, 2], "cell": "triangle"}
+    regions = [{"soil": "sand", "below": 5.0}, {"soil": "air"}]
+    resting = scene(
+        {"count": 1},
+        mesh={"box": box, "regions": regions, "empty": ["air"]},
+        motion=[{"direction": "x", "harmonic": wave}],
+        effects={"convection": True},
+    )
+    notes = inspect(resting).notes
+    assert notes[0].startswith("no line is excited")
+    assert not any("shear wave" in note for note in notes)
+
+
 @pytest.mark.parametrize("case", ["maxwell", "antiplane"])
 def test_points_of_transient_lapses_are_written_for_paraview(tmp_path, case):
     taken = []
