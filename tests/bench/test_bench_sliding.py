@@ -11,8 +11,10 @@ from collections import Counter
 
 import pytest
 from support.meshes import mesh_script
+from support.two_masses import LIMIT, STEP, TwoMasses, burst, linear_driving
 
 from fenics_hytf.lapse import Sliding
+from fenics_hytf.motion import march
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation import simulate
 
@@ -88,3 +90,15 @@ def test_a_mechanism_once_it_is_warm(size, tmp_path, monkeypatch, figure):
     slid = [pair for lapse, pair in zip(result.lapses, lapses, strict=True) if lapse.slip.slip[-1]]
     mine, rest = map(sum, zip(*slid[1:], strict=True))
     figure(f"a warm mechanism over the rest of its lapses, cells of {size} m", mine / rest, 0.4)
+
+
+def test_a_march_of_20000_steps(figure):
+    """Each step meets all before it: the convolution is what may take long."""
+    system, num = TwoMasses(0.0), 20_000
+    driving = linear_driving(system, burst(STEP, 101.0)[:num], STEP)
+    weights = system.weights(num, STEP)
+    march(driving[:10], LIMIT, weights, STEP)  # compiled
+    start = time.process_time()
+    march(driving, LIMIT, weights, STEP)
+    # a second of the processor for 200 s of motion; it was 5 s of the wall in a loaded suite
+    figure("a march of 20 000 steps", time.process_time() - start, 5.0, "s")

@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
 """What a run takes, said before: sizes without a mesh, memory, and a computer without room for it.
 
-Estimates of memory beside measured peaks, on one rank unless said otherwise:
+Estimates of memory beside measured peaks, on one rank unless said otherwise; rows with a * are
+measured again by ``bench/test_bench_memory.py``:
 
     run                                      unknowns  points  MiB told  measured  ratio
-    2D, direct, one lapse                       14400   28800       436       369   1.18
-    2D, reduced, triangles                      40000  120000       832       640   1.30
+  * 2D, direct, one lapse                       14400   28800       436       369   1.18
+  * 2D, reduced, triangles                      40000  120000       832       640   1.30
     2D, reduced, four lapses with fields        22500   45000       643       786   0.82
     2D, three lapses of hysteretic soil          6400   12800       385       384   1.00
-    2D, out of the plane                        20000   80000       480       430   1.11
+  * 2D, out of the plane                        20000   80000       480       430   1.11
     2D, a record of 40 000 samples                 40      80       397       409   0.97
-    3D, direct, hexahedra                        5070   11520       431       359   1.20
-    3D, reduced, hexahedra                      10404   24576       632       545   1.16
-    3D, reduced, tetrahedra                      6750   47040       556       418   1.33
+  * 3D, direct, hexahedra                        5070   11520       431       359   1.20
+  * 3D, reduced, hexahedra                      10404   24576       632       545   1.16
+  * 3D, reduced, tetrahedra                      6750   47040       556       418   1.33
     3D, two ranks that share the mesh           10404   24576       895       847   1.06
     3D, two ranks with a mesh each              10404   24576      1265      1123   1.13
     a slope that slides, three lapses            1498    2688       295       434   0.68
@@ -23,12 +24,11 @@ from __future__ import annotations
 
 import json
 import resource
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from mpi4py import MPI
+from support.foretold import told_and_taken
 from support.peaks import MIB, at_most_more
 
 from fenics_hytf.scene import Scene
@@ -82,15 +82,6 @@ def test_sizes_are_known_without_a_mesh(mesh):
     assert room_faults(given) == []
 
 
-MEASURE = """
-import json, sys
-from fenics_hytf.scene import Scene
-from fenics_hytf.simulation import inspect, peak_memory, simulate
-scene = Scene.from_dict(json.loads(sys.argv[1]))
-told = inspect(scene).memory_bytes
-simulate(scene, snapshot=lambda _: None)
-print(told / peak_memory())
-"""
 CASES = {
     "direct": {
         "mesh": {"box": {"size": [60.0, 40.0], "cells": [60, 40]}},
@@ -108,9 +99,8 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_memory_is_foretold_to_a_factor_of_two(case, figure):
     """In processes of their own, with peaks of their own; larger cases are in the table above."""
-    command = [sys.executable, "-c", MEASURE, json.dumps(scene(**CASES[case]).data)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    ratio = float(done.stdout)
+    _, _, told, taken = told_and_taken(scene(**CASES[case]))
+    ratio = told / taken
     figure(f"memory foretold, {case}: off by a factor", max(ratio, 1 / ratio), 2.0)
 
 
