@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from _pytest.terminal import TerminalReporter
-from support.figures import Figure
+from support.figures import Figure, kept_and_required
 
 _figures: list[Figure] = []
 
@@ -36,13 +36,16 @@ def pytest_unconfigure() -> None:
 def figure() -> Callable[..., None]:
     """Record a figure beside its limit, and require it: figure(name, measured, limit, unit)."""
 
-    def require(
-        name: str, measured: float, limit: float, unit: str = "", at_least: bool = False
-    ) -> None:
-        _figures.append(Figure(name, float(measured), float(limit), unit, at_least))
-        _figures[-1].require()
+    return kept_and_required(_figures.append)
 
-    return require
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder one stands in, empty, and no launcher of several ranks around."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
+        monkeypatch.delenv(name, raising=False)
+    return tmp_path
 
 
 @pytest.fixture

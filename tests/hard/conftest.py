@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from _pytest.terminal import TerminalReporter
 from mpi4py import MPI
-from support.figures import Figure
+from support.figures import Figure, kept_and_required
 from support.hard_table import TITLES, Row, faults, lines, read, write
 from support.small_run import COLUMN, FOLDER, HYTF, RUN
 
@@ -47,24 +47,17 @@ def figure(request: pytest.FixtureRequest) -> Callable[..., None]:
     reason = marker.kwargs.get("reason", "") if marker else ""
     case = _case(request.node)
 
-    def require(
-        name: str, measured: float, limit: float, unit: str = "", at_least: bool = False
-    ) -> None:
-        found = Figure(name, float(measured), float(limit), unit, at_least)
+    def keep(found: Figure) -> None:
         _rows.append(Row(case, request.node.name, MPI.COMM_WORLD.size, found, reason))
-        found.require()
 
-    return require
+    return kept_and_required(keep)
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch) -> Path:
-    """The folder one stands in, with the scene of a small column, and no launcher around."""
-    monkeypatch.chdir(tmp_path)
-    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
-        monkeypatch.delenv(name, raising=False)
+def here(here: Path) -> Path:
+    """The folder one stands in, with the scene of a small column."""
     Path("s.toml").write_text(COLUMN)
-    return tmp_path
+    return here
 
 
 @pytest.fixture(scope="session")

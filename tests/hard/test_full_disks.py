@@ -16,11 +16,11 @@ from pathlib import Path
 
 import pytest
 from support.restart import other_files
+from support.results_builder import make_result
 from support.small_run import FOLDER, RUN, STATE, told
 
 from fenics_hytf.results import open_result
 from fenics_hytf.simulation.checkpoint import read_checkpoint
-from tests.unit.results_builder import make_result
 
 
 class Disk:

@@ -22,6 +22,7 @@ import pytest
 from support.fuzz import toml
 from support.meshes import SOIL, gmsh_section
 from support.peaks import MIB, at_most_more
+from support.results_builder import make_result, make_scene
 
 from fenics_hytf.motion import RecordError, recorded
 from fenics_hytf.results import open_result, publish, read_result
@@ -35,7 +36,6 @@ from fenics_hytf.simulation.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
-from tests.unit.results_builder import make_result, make_scene
 
 EVIL = "<script>alert(1)</script>&\"'"
 FORMULA = "$x^{2$ \\frac{1 $ %s {0} \u202e"  # that matplotlib would trip over

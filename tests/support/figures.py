@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A figure that a test measures, beside the limit that it has to keep."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -46,3 +47,16 @@ class Figure:
         """Fail with the figure and the limit unless it is kept."""
         said = f"{self.name}: measured {self.measured:.4g}, wanted {self.sign} {self.limit:.4g}"
         assert self.good, f"{said} {self.unit}".rstrip()
+
+
+def kept_and_required(keep: Callable[[Figure], None]) -> Callable[..., None]:
+    """What the fixtures ``figure`` give: keeps a figure, good or not, and requires it."""
+
+    def require(
+        name: str, measured: float, limit: float, unit: str = "", at_least: bool = False
+    ) -> None:
+        found = Figure(name, float(measured), float(limit), unit, at_least)
+        keep(found)
+        found.require()
+
+    return require

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+from support.results_builder import make_result, make_scene
 
 from fenics_hytf.lapse.records import LapseResult
 from fenics_hytf.motion.files import part_of
@@ -29,7 +30,6 @@ from fenics_hytf.simulation.checkpoint import (
     take_checkpoint,
     write_checkpoint,
 )
-from tests.unit.results_builder import make_result, make_scene
 
 WORLD = MPI.COMM_WORLD
 META = {"format": 2, "lapse": 4, "state": {"x": {"array": "points/x"}}, "names": ["ä", None, 0.1]}

@@ -43,12 +43,9 @@ receivers = { top = [0.5, 8.0] }
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK"):
-        monkeypatch.delenv(name, raising=False)
+def here(here):
     Path("s.toml").write_text(SCENE)
-    return tmp_path
+    return here
 
 
 @pytest.fixture

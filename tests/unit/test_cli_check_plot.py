@@ -42,10 +42,9 @@ BASE = {"density": 1800.0, "shear_wave_velocity": 200.0, "poisson": 0.3}
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def here(here):
     Path("site.toml").write_text(SCENE)
-    return tmp_path
+    return here
 
 
 @pytest.fixture

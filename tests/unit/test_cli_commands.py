@@ -13,11 +13,11 @@ import time
 from pathlib import Path
 
 import pytest
+from support.results_builder import make_result, make_snapshot
 
 from fenics_hytf.cli import app, run
 from fenics_hytf.scene import Fault, SceneError
 from fenics_hytf.simulation import SimulationError
-from tests.unit.results_builder import make_result, make_snapshot
 
 SCENE = """
 title = "A column"
@@ -40,10 +40,9 @@ receivers = { top = [0.5, 8.0] }
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def here(here):
     Path("s.toml").write_text(SCENE)
-    return tmp_path
+    return here
 
 
 def files(folder):

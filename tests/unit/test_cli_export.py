@@ -9,17 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.results_builder import make_result
 
 from fenics_hytf.motion import read, read_csv
 from fenics_hytf.results import open_result, read_table
 from fenics_hytf.results.summary import FORMAT
-from tests.unit.results_builder import make_result
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 @pytest.fixture

@@ -12,10 +12,10 @@ import time
 from pathlib import Path
 
 import pytest
+from support.results_builder import make_result, make_snapshot
 
 from fenics_hytf.cli import run
 from fenics_hytf.simulation import SimulationError
-from tests.unit.results_builder import make_result, make_snapshot
 
 SCENE = """
 title = "A column"
@@ -41,10 +41,9 @@ STATE = "s-result/checkpoint/state.npz"
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def here(here):
     Path("s.toml").write_text(SCENE)
-    return tmp_path
+    return here
 
 
 @pytest.fixture

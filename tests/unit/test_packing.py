@@ -14,11 +14,11 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from support.results_builder import make_result
 
 from fenics_hytf.lapse.records import LapseResult
 from fenics_hytf.simulation import CheckpointError, Work
 from fenics_hytf.simulation.packing import pack, unpack
-from tests.unit.results_builder import make_result
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.colors import LogNorm
+from support.results_builder import DEGRADES, make_result
 
 from fenics_hytf.motion import GRAVITY, fourier_amplitude, smoothed
 from fenics_hytf.results import open_result, read_result
@@ -26,7 +27,6 @@ from fenics_hytf.results.figures.spectra import (
     transfer_functions,
 )
 from fenics_hytf.results.figures.stiffness import stiffness
-from tests.unit.results_builder import DEGRADES, make_result
 
 
 def store(folder, result):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 
 import pytest
+from support.results_builder import make_result, make_snapshot
 
 from fenics_hytf.motion.files import replace_file
 from fenics_hytf.results import (
@@ -19,7 +20,6 @@ from fenics_hytf.results import (
     publish,
     read_result,
 )
-from tests.unit.results_builder import make_result, make_snapshot
 
 
 def names(folder):

@@ -9,12 +9,12 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from support.results_builder import DEGRADES, ROCK, make_result
 
 from fenics_hytf.motion import intensity_measures
 from fenics_hytf.results import open_result, publish
 from fenics_hytf.results.report.conventions import method
 from fenics_hytf.results.summary import warnings
-from tests.unit.results_builder import DEGRADES, ROCK, make_result
 
 MOTION_X = ("histories_x", "transfer_x", "spectra_x", "fourier_x")
 PNG = b"\x89PNG\r\n\x1a\n"

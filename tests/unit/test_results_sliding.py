@@ -14,6 +14,12 @@ import meshio
 import numpy as np
 import pytest
 from PIL import Image
+from support.results_builder import (
+    SLIPS,
+    make_result,
+    make_slide,
+    make_slide_snapshot,
+)
 
 from fenics_hytf.cli import main
 from fenics_hytf.cli.closing import closing_words
@@ -30,12 +36,6 @@ from fenics_hytf.results.figures.stiffness import stiffness
 from fenics_hytf.results.overburden import vertical_stress
 from fenics_hytf.results.report.findings import iterations_table, what_slid
 from fenics_hytf.simulation.snapshots import _stiffness
-from tests.unit.results_builder import (
-    SLIPS,
-    make_result,
-    make_slide,
-    make_slide_snapshot,
-)
 from tests.unit.test_results_report import Page, text_of
 
 DT = 0.05

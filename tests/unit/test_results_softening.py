@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.results_builder import make_result
 
 from fenics_hytf.cli.closing import closing_words
 from fenics_hytf.lapse import SofteningResult
 from fenics_hytf.results import read_table
-from tests.unit.results_builder import make_result
 from tests.unit.test_results_report import text_of
 
 EFFECTS = {"equivalent_linear": True, "gravity": True, "softening": True}

@@ -11,6 +11,7 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from support.results_builder import DEGRADES, make_result, make_snapshot
 
 from fenics_hytf.motion import (
     GRAVITY,
@@ -20,7 +21,6 @@ from fenics_hytf.motion import (
 )
 from fenics_hytf.results import open_result, read_result, read_table
 from fenics_hytf.results.summary import plain
-from tests.unit.results_builder import DEGRADES, make_result, make_snapshot
 
 CASES = [
     {},
