@@ -31,14 +31,14 @@ from support.fuzz.trial import (
 
 from fenics_hytf.motion import RecordError, read
 
-NUMBER = int(os.environ.get("HYTF_FUZZ", "200"))
+HALF = max(1, int(os.environ.get("HYTF_FUZZ", "200")) // 2)
 SEED = os.environ.get("HYTF_FUZZ_SEED")
-HALF = NUMBER // 2
 STOPPED = 0.1
 """Part of the valid scenes that may end with a typed error: loops without a fixed point, ground
-too weak for its weight, points that leave where that is an error."""
+too weak for its weight, points that leave where that is an error. Of 100 scenes 2 and 7 did in two
+draws; were it 7 in the long run, 3 more would be one standard deviation."""
 
-pytestmark = pytest.mark.timeout(10 * max(NUMBER, 200))
+pytestmark = pytest.mark.timeout(20 * max(HALF, 100))
 
 
 def by_chance(number: int, test: Callable[[st.DataObject], None]) -> None:
@@ -46,15 +46,21 @@ def by_chance(number: int, test: Callable[[st.DataObject], None]) -> None:
 
     Each comes from a seed of its own: of many examples of one seed most are near relatives.
     """
+
+    def unless_simplest(data: st.DataObject) -> None:
+        """The first example of every seed is the simplest one, alike for all: a nought here."""
+        if data.draw(st.integers(0, 2**32)):
+            test(data)
+
+    once = settings(
+        max_examples=2,  # that one, and one by chance
+        deadline=None,  # each command is limited in seconds of its own
+        database=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    )
     first = 0 if SEED is None else int(SEED) * 1_000_003
-    for k in range(first, first + number):
-        once = settings(
-            max_examples=2,  # the simplest one, alike for every seed, and one by chance
-            deadline=None,  # each command is limited in seconds of its own
-            database=None,
-            suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-        )
-        seed(k)(once(given(st.data())(test)))()
+    for k in range(first, first + max(number, 1)):
+        seed(k)(once(given(st.data())(unless_simplest)))()
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +83,6 @@ def test_scenes_that_are_valid_come_to_their_end(drawn, place, figure):
         given = data.draw(sound_options())
         then, check = data.draw(uses(case, given)), data.draw(st.booleans())
         text = toml.document(case.data).encode()
-        if tally.knows(text):
-            return
         found = try_scene(place, text, case.files, given, then, tally.count, check)
         if tally.last.code == 2:
             found.append(f"a valid scene is refused: {tally.last.err}")
@@ -87,7 +91,8 @@ def test_scenes_that_are_valid_come_to_their_end(drawn, place, figure):
     by_chance(HALF, run)
     print(f"\nvalid scenes: {tally}")
     figure("fuzz: valid scenes", tally.codes.total(), HALF, at_least=True)
-    figure("fuzz: part of them that stopped", tally.codes[3] / tally.codes.total(), STOPPED)
+    # of a handful one may stop
+    figure("fuzz: of them stopped", tally.codes[3], max(1, STOPPED * HALF))
 
 
 def test_whatever_is_wrong_with_a_scene_is_told(drawn, place, figure):
@@ -96,15 +101,14 @@ def test_whatever_is_wrong_with_a_scene_is_told(drawn, place, figure):
     def run(data: st.DataObject) -> None:
         case, text = data.draw(broken_scenes(drawn))
         given, check = data.draw(options()), data.draw(st.booleans())
-        if not tally.knows(text):
-            found = try_scene(place, text, case.files, given, (), tally.count, check)
-            require(found, text, case.files)
+        found = try_scene(place, text, case.files, given, (), tally.count, check)
+        require(found, text, case.files)
 
     by_chance(HALF, run)
     print(f"\nbroken scenes: {tally}")
-    figure("fuzz: broken scenes", tally.codes.total(), 0.95 * HALF, at_least=True)
+    figure("fuzz: broken scenes", tally.codes.total(), HALF, at_least=True)
     # that the two halves differ: most of what is changed is seen
-    figure("fuzz: broken scenes refused", tally.codes[2], HALF / 2, at_least=True)
+    figure("fuzz: broken scenes refused", tally.codes[2], HALF // 2, at_least=True)
 
 
 def test_a_record_is_read_whole_or_refused(place):

@@ -104,14 +104,14 @@ def scenes(draw: st.DrawFn, drawn: dict[str, Drawn]) -> Case:
     for i, name in enumerate(ground.soils):
         curved = choices.loop and i == 0
         named[name] = draw(soils(curved, choices.slides, most, case.files, f"curves{i}.csv"))
-    boundary = draw(_boundaries(ground, choices, directions))
+    boundary = draw(_boundaries(ground, choices))
     effects = draw(_effects(ground, choices, boundary))
     sections = {
         "mesh": ground.table,
         "soil": named,
         "motion": tables,
         "boundary": boundary,
-        "lapses": draw(_lapses(choices, tables)),
+        "lapses": draw(_lapses(choices)),
         "effects": effects,
         "points": draw(_points()),
         "solver": draw(_solvers(choices)),
@@ -222,9 +222,7 @@ def _directions(draw: st.DrawFn, ground: _Ground, choices: _Choices) -> tuple[st
 
 
 @st.composite
-def _boundaries(
-    draw: st.DrawFn, ground: _Ground, choices: _Choices, directions: tuple[str, ...]
-) -> dict[str, Any]:
+def _boundaries(draw: st.DrawFn, ground: _Ground, choices: _Choices) -> dict[str, Any]:
     boundary: dict[str, Any] = {}
     if choices.compliant:
         rock: dict[str, Any] = {
@@ -333,7 +331,7 @@ def _gravities(draw: st.DrawFn) -> dict[str, Any] | bool:
 
 
 @st.composite
-def _lapses(draw: st.DrawFn, choices: _Choices, tables: list[dict[str, Any]]) -> dict[str, Any]:
+def _lapses(draw: st.DrawFn, choices: _Choices) -> dict[str, Any]:
     """Two lapses, of 20 samples at least where they hand over: records have 40 and more."""
     lapses: dict[str, Any] = {"continuity": "transient" if choices.transient else "steady"}
     if choices.several:

@@ -54,13 +54,6 @@ class Tally:
     codes: Counter[int | str | None] = field(default_factory=Counter)
     reasons: Counter[str] = field(default_factory=Counter)
     last: Answer = field(default=None, repr=False)  # type: ignore[assignment]
-    _known: set[bytes] = field(default_factory=set, repr=False)
-
-    def knows(self, scene: bytes) -> bool:
-        """Whether a scene was there before; from now on it was."""
-        known = scene in self._known
-        self._known.add(scene)
-        return known
 
     def count(self, answer: Answer) -> None:
         self.last = answer
