@@ -15,8 +15,8 @@ from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.check import checked_domain
 from fenics_hytf.simulation.demand import Demand, Sizes, demand_of, plan_of
 from fenics_hytf.simulation.margins import edge_notes
-from fenics_hytf.simulation.resolution import at_first, too_coarse
 from fenics_hytf.simulation.receivers import without_soil
+from fenics_hytf.simulation.resolution import at_first, too_coarse
 from fenics_hytf.soil import HELD_DAMPING
 
 _NEARLY_INCOMPRESSIBLE = 0.45  # Poisson's ratio from which cells lock noticeably
