@@ -56,27 +56,32 @@ def block_jobs(
 
 
 def _runs(fill: float, waves: Sequence[float], ghost: bool) -> Iterator[Row]:
-    size = (SIDE - 1 + fill) * CELL
-    with Site(_scene(size)) as fitted, Site(_scene(None), fill=_squeeze(fill, ghost)) as cut:
-        true, found = ScipySystem(fitted), ScipySystem(cut)
-    fitting = [true.at_receivers(_frequency(number)) for number in waves]
-    return (_run(fill, number, ghost, found, u) for number, u in zip(waves, fitting, strict=True))
+    with Site(_scene((SIDE - 1 + fill) * CELL)) as site:
+        fitted = ScipySystem(site)
+    true = [fitted.at_receivers(_frequency(number)) for number in waves]
+    return _cut(fill, waves, ghost, true)
 
 
-def _run(fill: float, waves: float, ghost: bool, found: ScipySystem, true: ComplexArray) -> Row:
-    """A block at one frequency, against the displacement on the mesh that fits it."""
-    s = _frequency(waves)
-    u, largest = found.at_receivers(s), float(np.abs(true).max())
-    error, amplitude = float(np.abs(u - true).max()) / largest, float(np.abs(u).max()) / largest
-    condition = float(np.linalg.cond(found.matrix(s).toarray()))
-    axes: Axes = {
-        "ghost": "yes" if ghost else "no",
-        "fill": fill,
-        "cells_a_wavelength": waves,
-        "frequency_hz": s.imag / (2 * np.pi),
-    }
-    figures = {"error": error, "amplitude_over_true": amplitude, "condition": condition}
-    return axes, figures, judge_response(error, amplitude, condition)
+def _cut(
+    fill: float, waves: Sequence[float], ghost: bool, true: Sequence[ComplexArray]
+) -> Iterator[Row]:
+    """The block at every frequency, against the displacement on the mesh that fits it."""
+    with Site(_scene(None), fill=_squeeze(fill, ghost)) as site:
+        cut = ScipySystem(site)
+    for number, expected in zip(waves, true, strict=True):
+        s = _frequency(number)
+        u, largest = cut.at_receivers(s), float(np.abs(expected).max())
+        error = float(np.abs(u - expected).max()) / largest
+        amplitude = float(np.abs(u).max()) / largest
+        condition = float(np.linalg.cond(cut.matrix(s).toarray()))
+        axes: Axes = {
+            "ghost": "yes" if ghost else "no",
+            "fill": fill,
+            "cells_a_wavelength": number,
+            "frequency_hz": s.imag / (2 * np.pi),
+        }
+        figures = {"error": error, "amplitude_over_true": amplitude, "condition": condition}
+        yield axes, figures, judge_response(error, amplitude, condition)
 
 
 def _frequency(waves: float) -> complex:
