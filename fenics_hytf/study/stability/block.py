@@ -23,7 +23,7 @@ from fenics_hytf.operators import GhostForm
 from fenics_hytf.particles import Points, move
 from fenics_hytf.scene import Scene
 from fenics_hytf.study.stability.ground import ScipySystem, Site
-from fenics_hytf.study.stability.records import BLOCK, Axes, Job, Row
+from fenics_hytf.study.stability.records import BLOCK, Job, MapValues, Row
 from fenics_hytf.study.stability.verdicts import judge_response
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -74,7 +74,7 @@ def _cut(
         error = float(np.abs(u - expected).max()) / largest
         amplitude = float(np.abs(u).max()) / largest
         condition = float(np.linalg.cond(cut.matrix(s).toarray()))
-        axes: Axes = {
+        axes: MapValues = {
             "ghost": "yes" if ghost else "no",
             "fill": fill,
             "cells_a_wavelength": number,

@@ -24,7 +24,7 @@ from fenics_hytf.lapse import HANDOVER, asked_residual
 from fenics_hytf.scene import Scene
 from fenics_hytf.simulation.margins import DEFAULT_TOLERANCE
 from fenics_hytf.study.stability.ground import ScipySystem, Site
-from fenics_hytf.study.stability.records import CONTRAST, Axes, Job, Row
+from fenics_hytf.study.stability.records import CONTRAST, Job, MapValues, Row
 from fenics_hytf.study.stability.verdicts import judge_solution
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -118,7 +118,9 @@ def _runs(place: str, contrast: float, damping: float) -> Iterator[Row]:
     return _swept({"place": place, "contrast": contrast, "damping": damping}, scene, true)
 
 
-def _swept(section: Axes, scene: Scene, true: Mapping[str, Sequence[Refined]]) -> Iterator[Row]:
+def _swept(
+    section: MapValues, scene: Scene, true: Mapping[str, Sequence[Refined]]
+) -> Iterator[Row]:
     with Site(scene) as site:
         equations, _ = site.assemble()
         for continuity, sweep in product(LINES, SWEEPS):

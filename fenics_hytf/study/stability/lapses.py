@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fenics_hytf.lapse import HANDOVER
 from fenics_hytf.study.stability.column import ColumnCase
-from fenics_hytf.study.stability.records import FREQUENCY, LAPSES, Axes, Job, Row
+from fenics_hytf.study.stability.records import FREQUENCY, LAPSES, Job, MapValues, Row
 from fenics_hytf.study.stability.reference import true_motion
 from fenics_hytf.study.stability.verdicts import judge_history, measure_history
 
@@ -88,7 +88,7 @@ def _runs(case: ColumnCase, decay: Sequence[float]) -> Iterator[Row]:
 def _run(case: ColumnCase, decay: float, true: RealArray) -> Row:
     motion, ledgers = case.march(decay)
     figures = measure_history(motion, true, case.still, ledgers)
-    axes: Axes = {
+    axes: MapValues = {
         "path": case.path,
         "lapse_times_max_frequency": case.periods,
         "damping": case.damping,

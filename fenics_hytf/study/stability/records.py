@@ -12,11 +12,11 @@ from fenics_hytf.study.stability.verdicts import Verdict
 LAPSES, FREQUENCY, BLOCK, CONTRAST = "lapses", "max_frequency", "cut_cells", "contrast"
 """Names of the maps; that of lapses has a figure of its own for the highest frequency."""
 
-Axes = Mapping[str, float | str]
-"""Where in a map a run lies, by column of the table."""
+MapValues = Mapping[str, float | str]
+"""Where in a map a run lies: values on its axes, by column of the table."""
 Figures = Mapping[str, float | None]
 """What was measured, by column of the table; a figure that does not exist is ``None``."""
-Row = tuple[Axes, Figures, Verdict]
+Row = tuple[MapValues, Figures, Verdict]
 
 
 class Job(NamedTuple):
@@ -48,7 +48,7 @@ class StabilityRun:
     """
 
     map: str
-    axes: Axes
+    axes: MapValues
     figures: Figures
     verdict: Verdict
     cpu_s: float
