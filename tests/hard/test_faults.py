@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import os
-import signal
+import shutil
 import subprocess
 import sys
 import time
@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.restart import other_files
-from support.small_run import COLUMN, FOLDER, HYTF, RUN, STATE, STRUCK, told
+from support.small_run import COLUMN, FOLDER, HYTF, RUN, STATE, out_of_memory, told
 
 from fenics_hytf.cli.progress import Estimate
 from fenics_hytf.results import open_result
@@ -132,14 +132,14 @@ def test_what_may_not_be_written_or_read_is_named(here):
 # ---------------------------------------------------------------- damaged checkpoints
 
 
-@pytest.fixture(scope="module")
-def unfinished(tmp_path_factory) -> bytes:
-    """The checkpoint of a run that was lost in its second lapse."""
-    folder = tmp_path_factory.mktemp("unfinished")
-    (folder / "s.toml").write_text(COLUMN)
-    command = [sys.executable, "-c", STRUCK, "0", "killed", FOLDER]
-    assert subprocess.run(command, cwd=folder, check=False).returncode == -signal.SIGKILL
-    return (folder / STATE).read_bytes()
+@pytest.fixture
+def unfinished(here, hytf) -> bytes:
+    """The checkpoint of a run that was lost in its second lapse; its folder is gone."""
+    with out_of_memory():
+        assert hytf(*RUN, "--quiet")[0] == 3
+    content = STATE.read_bytes()
+    shutil.rmtree(FOLDER)
+    return content
 
 
 def test_a_checkpoint_that_is_damaged_anywhere_is_refused(here, hytf, unfinished):
@@ -248,7 +248,7 @@ main()
         "hytf demo | head -0",
         "hytf run s.toml --no-plots 2>&1 | head -1 >/dev/null",
         "hytf run s.toml --no-plots <&- >&- 2>&-",
-        "hytf check s.toml >/dev/full",
+        "hytf demo >/dev/full",
         "python3 short_map.py stability >/dev/full",
     ],
 )
@@ -266,20 +266,18 @@ def test_streams_that_nobody_reads(here, command):
         assert "standard output cannot be written (No space left on device)" in done.stderr
 
 
-@pytest.mark.parametrize(
-    "variables",
-    [
-        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-        {"PYTHONIOENCODING": "ascii", "COLUMNS": "1", "TERM": "dumb"},
-    ],
-    ids=lambda v: " ".join(f"{name}={value}" for name, value in v.items()),
-)
-def test_another_language_or_a_narrow_terminal(here, variables):
+def test_another_language_and_a_narrow_terminal(here):
     """Texts of the scene that an encoding does not have are shown somehow, files are UTF-8."""
+    language = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    terminal = {"PYTHONIOENCODING": "ascii", "COLUMNS": "1", "TERM": "dumb"}
     Path("s.toml").write_text(COLUMN.replace("A column", "Böschung 山"), encoding="utf-8")
+    told_so = os.environ | language | terminal
     for command in (["run", "s.toml", "--no-plots"], ["run", "--help"]):
         done = subprocess.run(
-            [*HYTF, *command], capture_output=True, check=False, env=os.environ | variables
+            [*HYTF, *command],
+            capture_output=True,
+            check=False,
+            env=told_so,
         )
         assert done.returncode == 0 and b"Traceback" not in done.stderr, done.stderr
     summary = json.loads(Path(FOLDER, "summary.json").read_text(encoding="utf-8"))

@@ -61,8 +61,8 @@ fields = true
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    place = tmp_path / "a/b"  # so that ../.. is seen too
+def here(here, monkeypatch):
+    place = here / "a/b"  # so that ../.. is seen too
     place.mkdir(parents=True)
     monkeypatch.chdir(place)
     Path("s.toml").write_text(SCENE)
@@ -380,12 +380,19 @@ TEXTS = ["title", "warnings", "motions", "scene", "versions", "written", "effect
 TEXTS += ["receivers peaks intensity"]
 
 
-@pytest.mark.parametrize("parts", TEXTS)
-def test_no_text_of_a_summary_becomes_markup(tmp_path, parts):
-    """What a result from elsewhere says, wherever it says it: the page has the same elements."""
-    with open_result(tmp_path / "r") as folder:
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> Path:
+    """A result on rock, to be read, or copied and tampered with."""
+    place = tmp_path_factory.mktemp("made") / "r"
+    with open_result(place) as folder:
         folder.write(make_result(kind="box", compliant=True))
-    stored = read_result(tmp_path / "r")
+    return place
+
+
+@pytest.mark.parametrize("parts", TEXTS)
+def test_no_text_of_a_summary_becomes_markup(made, parts):
+    """What a result from elsewhere says, wherever it says it: the page has the same elements."""
+    stored = read_result(made)
     stored.summary["warnings"] = ["a warning"]
     clean = Page(report(stored, []))
     for part in parts.split():
@@ -396,12 +403,6 @@ def test_no_text_of_a_summary_becomes_markup(tmp_path, parts):
 
 
 # ---------------------------------------------------------------- results from elsewhere
-
-
-def tampered(place: Path) -> dict:
-    with open_result(place) as folder:
-        folder.write(make_result(kind="box"))
-    return json.loads((place / "summary.json").read_text())
 
 
 HARMS = {
@@ -425,9 +426,10 @@ UNSEEN += ["motions without names", "sliding that is none"]
 
 @pytest.mark.parametrize("command", ["plot", "export"])
 @pytest.mark.parametrize("harm", HARMS)
-def test_a_result_that_was_tampered_with_is_refused(here, hytf, command, harm):
-    summary = HARMS[harm](tampered(Path("r")))
-    Path("r/summary.json").write_text(json.dumps(summary))
+def test_a_result_that_was_tampered_with_is_refused(here, hytf, made, command, harm):
+    shutil.copytree(made, "r")
+    summary = json.loads(Path("r/summary.json").read_text())
+    Path("r/summary.json").write_text(json.dumps(HARMS[harm](summary)))
     before = tree(here.parents[1])
     code, out, error = hytf(command, "r")
     left = tree(here.parents[1]) - before
@@ -465,8 +467,8 @@ def test_a_summary_that_is_none_is_refused(here, hytf, command, content):
 @pytest.mark.parametrize("command", ["plot", "export"])
 @pytest.mark.parametrize("table", ["receivers", "base"])
 @pytest.mark.parametrize("content", [None, b"", b"time_s\n", b"\xff\n1\n", b"a,b\n1\n", b"a\nx\n"])
-def test_a_table_that_is_missing_or_none_is_refused(here, hytf, command, table, content):
-    tampered(Path("r"))
+def test_a_table_that_is_missing_or_none_is_refused(here, hytf, made, command, table, content):
+    shutil.copytree(made, "r")
     path = Path("r", f"{table}.csv")
     path.unlink()
     if content is not None:

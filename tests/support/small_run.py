@@ -2,7 +2,14 @@
 """A column that runs in a second, for tests of what may befall a run."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+import pytest
+
+from fenics_hytf.motion import Segment
+from fenics_hytf.simulation.run import Run
 
 COLUMN = """
 title = "A column"
@@ -47,6 +54,21 @@ def solve_lapse(self, segment):
 Run.solve_lapse = solve_lapse
 main(["run", "s.toml", "--no-plots", "-o", sys.argv[3]])
 """
+
+
+@contextmanager
+def out_of_memory() -> Iterator[None]:
+    """Let runs of this process find no memory in their second lapse."""
+    solve = Run.solve_lapse
+
+    def solve_lapse(self: Run, segment: Segment) -> object:
+        if segment.index == 1:
+            raise MemoryError("Unable to allocate 3 TiB")
+        return solve(self, segment)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Run, "solve_lapse", solve_lapse)
+        yield
 
 
 def told(error: str) -> str:
