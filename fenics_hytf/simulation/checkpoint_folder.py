@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation.checkpoint import (
+    FILE,
     Checkpoint,
     read_checkpoint,
     require_same_scene,
@@ -38,7 +39,6 @@ class CheckpointFolder:
         path: The folder.
         found: The checkpoint that the run goes on from, let go of once another is kept; ``None``
             where it starts at the first lapse.
-        lapse: Number of the lapse after which the last checkpoint was kept, ``None`` without one.
 
     Raises:
         CheckpointError: The checkpoint cannot be read.
@@ -58,7 +58,27 @@ class CheckpointFolder:
         self._comm = comm
         self._first = first
         self.found: Checkpoint | None = self._at_root(self._read) if resume else None
-        self.lapse = None if self.found is None else self.found.lapse
+        self._lapse = None if self.found is None else self.found.lapse
+        # a lapse that is being kept, and the file that its own replaces
+        self._coming: tuple[int, tuple[int, int] | None] | None = None
+
+    @property
+    def lapse(self) -> int | None:
+        """Number of the lapse after which the last checkpoint was kept, ``None`` without one.
+
+        By the file that is there: an interrupted run tells this, and may be anywhere in ``save``.
+        """
+        if self._coming is not None and self._file() not in (None, self._coming[1]):
+            return self._coming[0]
+        return self._lapse
+
+    def _file(self) -> tuple[int, int] | None:
+        """What tells one checkpoint file from the next, which is written beside it."""
+        try:
+            found = (self.path / FILE).stat()
+        except OSError:
+            return None
+        return found.st_ino, found.st_mtime_ns
 
     @property
     def group_size(self) -> int | None:
@@ -102,8 +122,10 @@ class CheckpointFolder:
         Raises:
             CheckpointError: It could not be written; on every rank. The last one is kept.
         """
+        self._coming = lapse, self._file()
         self._at_root(lambda: self._write(lapse, group_size, state))
-        self.lapse, self.found = lapse, None
+        self._lapse = lapse
+        self._coming = self.found = None
 
     def _read(self) -> Checkpoint | None:
         found = read_checkpoint(self.path)

@@ -350,6 +350,22 @@ def test_every_rank_goes_on_from_the_same(shared_path):
     WORLD.Barrier()
 
 
+def test_what_is_kept_is_told_as_soon_as_it_is(tmp_path, monkeypatch):
+    """A run may be interrupted at any moment: naively the file is there, and the run says not."""
+    folder, told = CheckpointFolder(tmp_path / "c", make_scene(lapses=3), MPI.COMM_SELF), []
+    replace = os.replace
+
+    def watched(part, path):
+        told.append(folder.lapse)
+        replace(part, path)
+        told.append(folder.lapse)
+
+    monkeypatch.setattr(os, "replace", watched)
+    for lapse in range(2):
+        folder.save(lapse, 1, {})
+    assert told == [None, 0, 0, 1]
+
+
 @pytest.mark.mpi
 def test_what_fails_on_the_first_rank_stops_all(shared_path, monkeypatch):
     scene, place = make_scene(), shared_path / "c"
