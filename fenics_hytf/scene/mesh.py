@@ -17,6 +17,7 @@ from pydantic import Field
 
 from fenics_hytf.scene.axes import CELLS, raw_gdim
 from fenics_hytf.scene.faults import Fault, SceneError, join_key, toml_text
+from fenics_hytf.scene.files import unusable
 from fenics_hytf.scene.quadrature import allowed_points_per_cell, default_points_per_cell
 from fenics_hytf.scene.regions import RealArray, Region, polygon_rules
 from fenics_hytf.scene.table import (
@@ -272,8 +273,9 @@ def read_mesh(raw: object, folder: Path) -> tuple[Mesh | None, list[Fault]]:
     missing: list[Fault] = []
     if isinstance(raw, dict) and isinstance(raw.get("file"), str):
         path = Path(folder, raw["file"]).absolute()
-        if not is_file(path):
-            found = f"{toml_text(raw['file'])}, which is not there"
+        why = unusable(path)
+        if why:
+            found = f"{toml_text(raw['file'])}, {why}"
             missing.append(Fault("mesh.file", found, f"a mesh file; looked for {path}"))
         raw = {**raw, "file": path}
     mesh, faults = read_table(Mesh, raw, "mesh")
@@ -290,14 +292,6 @@ def layout(raw: object) -> Mesh | None:
         return None
     shape = {name: raw[name] for name in ("column", "box", "regions", "empty") if name in raw}
     return read_table(Mesh, shape, "mesh")[0]
-
-
-def is_file(path: Path) -> bool:
-    """Whether a file is there; a path that cannot exist is not."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
 
 
 def _size_rules(raw: dict[str, Any], key: str) -> Iterator[Fault]:

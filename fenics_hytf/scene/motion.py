@@ -15,7 +15,7 @@ from pydantic import Field
 from fenics_hytf import motion as records
 from fenics_hytf.scene.axes import AXES
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import is_file
+from fenics_hytf.scene.files import unusable
 from fenics_hytf.scene.table import (
     LARGEST,
     Positive,
@@ -209,8 +209,9 @@ def _read_record(
     try:
         if source == "file":
             path = Path(folder, value)
-            if not is_file(path):
-                found = f"{toml_text(value)}, which is not there"
+            why = unusable(path)
+            if why:
+                found = f"{toml_text(value)}, {why}"
                 return None, [Fault(key, found, f"an AT2 or CSV file; looked for {path}")]
             return records.read(path, dt=number(raw, "dt"), units=raw.get("units") or "g"), []
         if source == "harmonic":

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from fenics_hytf.scene.faults import Fault, fault_from, join_key, name_key, toml_text
-from fenics_hytf.scene.mesh import is_file
+from fenics_hytf.scene.files import unusable
 from fenics_hytf.scene.table import (
     LARGEST,
     NAME,
@@ -227,8 +227,9 @@ def _with_columns(
     if not isinstance(file, str) or not file:
         return raw, [Fault(where, toml_text(file), "the path of a CSV file")]
     path = Path(folder, file)
-    if not is_file(path):
-        found = f"{toml_text(file)}, which is not there"
+    why = unusable(path)
+    if why:
+        found = f"{toml_text(file)}, {why}"
         return raw, [Fault(where, found, f"a CSV file of curves; looked for {path}")]
     try:
         columns = read_curve_file(path)

@@ -5,14 +5,17 @@ from __future__ import annotations
 
 import copy
 import re
+import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from fenics_hytf.scene.faults import Fault, toml_text
+from fenics_hytf.scene.files import IRREGULAR, unusable
 
 _INDEX = re.compile(r"\[(\d+)\]")
+_LONG_INDEX = 10  # digits: no array is that long, and int() takes no more than some thousands
 _SOURCES = ("file", "harmonic", "record", "synthetic", "dt", "units")
 
 
@@ -30,6 +33,8 @@ def read_source(
     Returns:
         The table, or ``None`` if the file cannot be read; and the faults.
     """
+    if unusable(path) == IRREGULAR:
+        return None, [Fault(str(path), f"nothing that can be read ({IRREGULAR})", "a scene file")]
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -44,6 +49,8 @@ def read_source(
         return None, [_syntax_fault(path, text, str(error))]
     except RecursionError:
         return None, [Fault(str(path), "values nested too deeply", "a scene file")]
+    except ValueError:  # of int(), which refuses to read so many digits
+        return None, [_long_integer(f"{path}{_line_of_digits(text)}")]
     if motion_file is not None:
         _replace_motion(data, Path(motion_file).absolute())
     faults = [fault for override in overrides for fault in apply_override(data, override)]
@@ -70,11 +77,13 @@ def apply_override(data: dict[str, Any], override: str) -> list[Fault]:
         value = parsed["value"] if len(parsed) == 1 else right
     except (tomllib.TOMLDecodeError, RecursionError):
         value = right.strip()
+    except ValueError:
+        return [_long_integer(f"--set {left.strip()}")]
     place: Any = data
     for step, part in enumerate(path):
         last = step == len(path) - 1
         if isinstance(place, list):
-            if not (part.isdecimal() and int(part) < len(place)):
+            if not (part.isdecimal() and len(part) < _LONG_INDEX and int(part) < len(place)):
                 return [Fault(key, part, f"an item from 0 to {len(place) - 1}")]
             index: Any = int(part)
         elif isinstance(place, dict):
@@ -123,6 +132,18 @@ def _syntax_fault(path: Path, text: str, message: str) -> Fault:
     content = lines[line - 1].strip() if line <= len(lines) else ""
     where = f" at {place[2]}" if place and place[2] else ""
     return Fault(f"{path}, line {line}", toml_text(content), f"valid TOML ({what}{where})")
+
+
+def _long_integer(key: str) -> Fault:
+    """An integer that is longer than Python reads."""
+    most = sys.get_int_max_str_digits()
+    return Fault(key, f"an integer of more than {most} digits", "a number that can be used")
+
+
+def _line_of_digits(text: str) -> str:
+    """Where the first such integer stands, as far as that can be seen from the text alone."""
+    digits = re.search(rf"[\d_]{{{sys.get_int_max_str_digits() + 1},}}", text)
+    return f", line {text.count(chr(10), 0, digits.start()) + 1}" if digits else ""
 
 
 def copy_data(data: dict[str, Any]) -> dict[str, Any]:

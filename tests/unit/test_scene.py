@@ -392,6 +392,21 @@ def test_overrides_that_cannot_be_set(tmp_path, override):
     assert [fault.key for fault in faults] == [f"--set {override}"]
 
 
+@pytest.mark.parametrize(
+    ("override", "key", "found"),
+    [
+        ("lapses.count=" + "1" * 5000, "--set lapses.count", "an integer of more than 4300 digits"),
+        ("motion[" + "1" * 5000 + "].pga=3", "--set motion[1", "111"),
+    ],
+    ids=["value", "index"],
+)
+def test_overrides_of_more_digits_than_are_read(tmp_path, override, key, found):
+    path = tmp_path / "s.toml"
+    path.write_text(COLUMN)
+    _, faults = examine(path, [override])
+    assert [fault.key.startswith(key) and found in fault.found for fault in faults] == [True]
+
+
 def test_motion_file_takes_the_place_of_the_source(tmp_path, at2, monkeypatch):
     path = tmp_path / "scenes" / "s.toml"
     path.parent.mkdir()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 import copy
 import datetime as dt
+import os
 import tomllib
 
 import pytest
@@ -440,8 +441,9 @@ def test_records_that_cannot_be_used(tmp_path, name, content, found):
         (b"a = 1\na = 2\n", "s.toml, line 2", "valid TOML"),
         (b"title = \"\xe9\"", "s.toml", "UTF-8"),
         (b"a = " + b"[" * 100_000, "s.toml", "a scene file"),
+        (b"a = 1\nb = " + b"1" * 5000, "s.toml, line 2", "a number that can be used"),
     ],
-    ids=["value", "table", "twice", "latin1", "deep"],
+    ids=["value", "table", "twice", "latin1", "deep", "digits"],
 )  # fmt: skip
 def test_a_file_that_is_no_scene(tmp_path, content, key, text):
     path = tmp_path / "s.toml"
@@ -456,6 +458,23 @@ def test_a_file_that_is_no_scene(tmp_path, content, key, text):
 def test_a_file_that_cannot_be_read(tmp_path, name):
     with pytest.raises(SceneError, match="nothing that can be read"):
         Scene.load(tmp_path / name)
+
+
+def test_what_is_no_regular_file_is_not_opened(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)  # which nothing is ever written to
+    with pytest.raises(SceneError, match="which is no regular file"):
+        Scene.load(pipe)
+    for path in (pipe, tmp_path, "/dev/zero"):
+        got = faults(
+            changed(mesh={"file": str(path)}, motion__0={"direction": "x", "file": str(path)})
+        )
+        assert [fault.key for fault in got if "which is no regular file" in fault.found] == [
+            "mesh.file",
+            "motion[0].file",
+        ]
+        got = faults(changed(soil__sand__curves={"file": str(path)}))
+        assert "which is no regular file" in got[0].found
 
 
 def test_an_empty_file(tmp_path):

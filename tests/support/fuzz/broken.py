@@ -151,7 +151,7 @@ def _blow_up(draw: st.DrawFn, data: dict[str, Any]) -> None:
 def _garbled(draw: st.DrawFn, text: bytes) -> bytes:
     """A scene file cut off, with bytes put in, left out or turned round, or without end."""
     at = draw(st.integers(0, len(text) - 1))
-    how = draw(st.sampled_from(("cut", "insert", "drop", "repeat", "nest", "order")))
+    how = draw(st.sampled_from(("cut", "insert", "drop", "repeat", "nest", "digits", "order")))
     if how == "cut":
         return text[:at]
     if how == "insert":
@@ -163,6 +163,8 @@ def _garbled(draw: st.DrawFn, text: bytes) -> bytes:
         return text + text[at:]
     if how == "nest":
         return text + b"x = " + b"[" * 5000 + b"]" * 5000
+    if how == "digits":  # more than int() reads
+        return text + b"x = " + b"1" * 5000
     lines = text.split(b"\n")
     return b"\n".join(lines[::-1])
 
