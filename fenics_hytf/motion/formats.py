@@ -8,6 +8,7 @@ The fourth line reads ``4096    0.0100    NPTS, DT`` in files of the older datab
 
 from __future__ import annotations
 
+import codecs
 import re
 from decimal import Decimal
 from os import PathLike
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fenics_hytf.motion.records import GRAVITY, RealArray, Record, RecordError
+from fenics_hytf.motion.units import UNITS, UnitError, acceleration_unit, check_time, names_time
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _HEADERS = (
@@ -23,11 +25,11 @@ _HEADERS = (
     re.compile(rf"^\s*(\d+)[\s,]+({_NUMBER})[\s,]+NPTS\b.*\bDT\b", re.IGNORECASE),
 )
 _UNITS = re.compile(r"UNITS?\s+OF\s+([^\s,]+)", re.IGNORECASE)
+_FORTRAN_EXPONENT = re.compile(r"(?<=[\d.])[dD](?=[-+]?\d)")
+_WITH_COMMA = r"[-+]?\d+(?:,\d+)?(?:[eE][-+]?\d+)?"
+_DECIMAL_COMMAS = re.compile(rf"(?=.*,){_WITH_COMMA}(?:\s*;\s*|\s+){_WITH_COMMA}")
 _HEADER_LINES = 10
 """Lines searched for the AT2 header: four by the format, a few more for added comments."""
-
-UNITS = {"g": GRAVITY, "m/s2": 1.0}
-"""Factor from each unit that a CSV file may use to m/s^2."""
 
 STEP_TOLERANCE = 1e-3
 """Largest departure of a step from the mean time step, relative to it.
@@ -47,13 +49,13 @@ _SLACK = 1.01
 """Leaves room for round-off where a difference of rounded times is a whole unit."""
 
 
-def read(path: str | PathLike[str], *, dt: float | None = None, units: str = "g") -> Record:
+def read(path: str | PathLike[str], *, dt: float | None = None, units: str | None = None) -> Record:
     """Read a record, in the format that the file's suffix says.
 
     Args:
         path: File that ends in ``.at2`` or ``.csv``, in any case.
         dt: Time step [s] of a CSV file of one column.
-        units: Unit of a CSV file, ``"g"`` or ``"m/s2"``; AT2 is always in g.
+        units: Unit of a CSV file, see :func:`read_csv`; AT2 is always in g.
 
     Returns:
         The record, named after the file.
@@ -66,12 +68,14 @@ def read(path: str | PathLike[str], *, dt: float | None = None, units: str = "g"
     if suffix == ".csv":
         return read_csv(path, dt=dt, units=units)
     if suffix == ".at2":
-        if dt is not None or units != "g":
+        said = [f"dt = {dt}"] * (dt is not None)
+        said += [f"units = '{units}'"] * (units not in (None, "g"))
+        if said:
             raise RecordError.at(
                 path,
                 None,
-                f"an AT2 file together with dt = {dt}, units = '{units}'",
-                "neither: the file states its time step and is in g",
+                f"an AT2 file together with {' and '.join(said)}",
+                "neither dt nor units: the file states its time step and is in g",
                 "leave them out",
             )
         return read_at2(path)
@@ -97,7 +101,8 @@ def read_at2(path: str | PathLike[str]) -> Record:
     start, num_samples, dt = _at2_header(path, lines)
     values: list[float] = []
     for number, line in enumerate(lines[start:], start=start + 1):
-        values.extend(_value(path, number, token) for token in line.split())
+        tokens = _FORTRAN_EXPONENT.sub("E", line).split()
+        values.extend(_value(path, number, token) for token in tokens)
     if len(values) != num_samples:
         raise RecordError.at(
             path,
@@ -109,28 +114,38 @@ def read_at2(path: str | PathLike[str]) -> Record:
     return Record(GRAVITY * np.array(values), dt, Path(path).stem)
 
 
-def read_csv(path: str | PathLike[str], dt: float | None = None, units: str = "g") -> Record:
+def read_csv(
+    path: str | PathLike[str], dt: float | None = None, units: str | None = None
+) -> Record:
     """Read comma-separated values: ``time_s,acceleration``, or accelerations alone with ``dt``.
 
-    Lines that are empty or start with ``#`` are skipped, one line of column names is too. The
-    first time need not be 0; only the time step is kept.
+    Lines that are empty or start with ``#`` are skipped; one line may name the columns. The first
+    time need not be 0; only the time step is kept.
+
+    A unit that the names state counts, as in ``time_s,acceleration_m_s2`` or
+    ``# Time (s),Acceleration (g)``, and so does the ``[m/s2]`` that
+    :func:`~fenics_hytf.motion.write_csv` puts at the end of its comment. Velocities, displacements,
+    accelerations in other units and times that are not in seconds are refused by their names.
 
     Args:
         path: The file.
         dt: Time step [s]: needed for one column; with two it must agree with the times.
-        units: Unit of the accelerations, ``"g"`` or ``"m/s2"``.
+        units: Unit of the accelerations, ``"g"`` or ``"m/s2"``; ``None`` for the one that the file
+            names, g if it names none.
 
     Returns:
         The record in m/s^2, named after the file.
 
     Raises:
         RecordError: If the file cannot be read, a line is not made of finite numbers, there are
-            fewer than two samples, or the time step changes.
+            fewer than two samples, the time step changes, or the names of the columns state
+            something else than ``units`` or than can be read.
         ValueError: If ``units`` is unknown.
     """
-    if units not in UNITS:
+    if units is not None and units not in UNITS:
         raise ValueError(f"units: found '{units}'; expected one of {', '.join(UNITS)}")
-    numbers, rows = _csv_rows(path)
+    numbers, rows, names = _csv_rows(path)
+    unit = _csv_unit(path, names, units)
     values = np.array(
         [[_value(path, n, t) for t in row] for n, row in zip(numbers, rows, strict=True)]
     )
@@ -145,7 +160,7 @@ def read_csv(path: str | PathLike[str], dt: float | None = None, units: str = "g
         raise RecordError.at(
             path, numbers[0], "one column", "time_s,acceleration", "add the times or give dt"
         )
-    return Record(UNITS[units] * values[:, -1], dt, Path(path).stem)
+    return Record(UNITS[unit] * values[:, -1], dt, Path(path).stem)
 
 
 def reads_as_header(line: str) -> bool:
@@ -156,11 +171,16 @@ def reads_as_header(line: str) -> bool:
 def _lines(path: str | PathLike[str]) -> list[str]:
     """Lines of a text file."""
     try:
-        return Path(path).read_text(encoding="utf-8-sig", errors="replace").splitlines()
+        if Path(path).exists() and not Path(path).is_file():  # a pipe may wait for ever
+            raise OSError(0, "no regular file")
+        content = Path(path).read_bytes()
     except OSError as error:
         raise RecordError.at(
             path, None, f"{error.strerror}", "a readable file", "check the path"
         ) from error
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise RecordError.at(path, None, "text in UTF-16", "text in UTF-8", "save it as UTF-8")
+    return content.decode("utf-8-sig", errors="replace").splitlines()
 
 
 def _value(path: str | PathLike[str], line: int, token: str) -> float:
@@ -210,19 +230,31 @@ def _at2_header(path: str | PathLike[str], lines: list[str]) -> tuple[int, int, 
     )
 
 
-def _csv_rows(path: str | PathLike[str]) -> tuple[list[int], list[list[str]]]:
-    """Line numbers and fields of the lines of values, one or two fields each."""
+def _csv_rows(
+    path: str | PathLike[str],
+) -> tuple[list[int], list[list[str]], dict[int, list[str]]]:
+    """Line numbers and fields of the lines of values, one or two each; names by line number."""
     numbers: list[int] = []
     rows: list[list[str]] = []
+    names: dict[int, list[str]] = {}
     header_seen = False
     for number, line in enumerate(_lines(path), start=1):
         text = line.strip()
-        if not text or text.startswith("#"):
+        if not text:
             continue
+        if text.startswith("#"):
+            found = [] if rows else _names_in_comment(text)
+            if found:
+                names[number] = found
+            continue
+        if _DECIMAL_COMMAS.fullmatch(text):
+            advice = "write 0.5 for 0,5 throughout"
+            raise RecordError.at(path, number, f"decimal commas in '{text}'", "points", advice)
         separator = next((s for s in ",;" if s in text), None)
         fields = [field.strip() for field in text.split(separator)]
         if not rows and not header_seen and not any(_is_number(field) for field in fields):
             header_seen = True
+            names[number] = _column_names(text)
             if len(fields) > 1 and fields[1].lower().startswith("time"):
                 raise RecordError.at(
                     path, number, f"'{text}'", "time_s,acceleration", "swap the columns"
@@ -243,7 +275,49 @@ def _csv_rows(path: str | PathLike[str]) -> tuple[list[int], list[list[str]]]:
         raise RecordError.at(
             path, None, f"{len(rows)} samples", "at least 2", "give a longer record"
         )
-    return numbers, rows
+    return numbers, rows, names
+
+
+def _column_names(text: str) -> list[str]:
+    """Names of columns, apart by a comma or the like, else by white space before a letter."""
+    separator = next((s for s in ",;\t" if s in text), None)
+    return text.split(separator) if separator else re.split(r"\s+(?=[^\W\d_])", text, maxsplit=1)
+
+
+def _names_in_comment(text: str) -> list[str]:
+    """Names of columns in a comment: times first, or a unit at its end; else nothing."""
+    names = _column_names(text.lstrip("# "))
+    if len(names) == 2 and names_time(names[0]):
+        return names
+    at_end = re.search(r"\[([^\[\]]+)\]$", text)
+    return [at_end[0]] if at_end and at_end[1] in UNITS else []
+
+
+def _csv_unit(path: str | PathLike[str], names: dict[int, list[str]], given: str | None) -> str:
+    """The unit of the accelerations, on which all agree who name one.
+
+    Args:
+        path: The file, for messages.
+        names: Names of the columns, by line number.
+        given: What the caller says.
+    """
+    unit, said_by = given, f'units = "{given}"'
+    for number, columns in names.items():
+        where = path, number, f"'{','.join(columns)}'"
+        try:
+            if len(columns) > 1:
+                check_time(columns[0])
+            found = acceleration_unit(columns[-1])
+        except UnitError as error:
+            expected = "times in s, accelerations in g or m/s2"
+            raise RecordError.at(*where, expected, str(error)) from None
+        if unit is not None and found is not None and found != unit:
+            expected = f"accelerations in {unit}, as {said_by} says"
+            advice = f'give units = "{found}" or correct the line'
+            raise RecordError.at(*where, expected, advice)
+        if unit is None and found is not None:
+            unit, said_by = found, f"line {number}"
+    return unit or "g"
 
 
 def _is_number(token: str) -> bool:

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fenics_hytf.motion.formats import UNITS, reads_as_header
+from fenics_hytf.motion.formats import reads_as_header
 from fenics_hytf.motion.records import GRAVITY, Record
+from fenics_hytf.motion.units import UNITS
 
 _PER_LINE = 5
 _LONGEST = 80

@@ -179,7 +179,8 @@ def _read_motion(raw: object, folder: Path, key: str) -> tuple[MotionInput | Non
         return None, faults
     source = given(raw, *SOURCES)[0]
     where = join_key(key, source)
-    if any(fault.key.startswith(where) or fault.key == join_key(key, "dt") for fault in faults):
+    taken = (join_key(key, "dt"), join_key(key, "units"))
+    if any(fault.key.startswith((where, *taken)) for fault in faults):
         return None, faults
     record, found = _read_record(raw, source, folder, where)
     faults += found
@@ -213,7 +214,7 @@ def _read_record(
             if why:
                 found = f"{toml_text(value)}, {why}"
                 return None, [Fault(key, found, f"an AT2 or CSV file; looked for {path}")]
-            return records.read(path, dt=number(raw, "dt"), units=raw.get("units") or "g"), []
+            return records.read(path, dt=number(raw, "dt"), units=raw.get("units")), []
         if source == "harmonic":
             return records.harmonic(**value), []
         if source == "record":

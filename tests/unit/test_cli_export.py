@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from support.results_builder import make_result
 
-from fenics_hytf.motion import read, read_csv
+from fenics_hytf.motion import RecordError, read, read_csv
 from fenics_hytf.results import open_result, read_table
 from fenics_hytf.results.summary import FORMAT
 
@@ -97,6 +97,8 @@ def test_every_quantity_as_csv(here, hytf, quantity, letter, head):
         np.testing.assert_allclose(read_csv(name).acceleration, table[f"r1.{letter}_x"], rtol=3e-16)
     else:
         np.testing.assert_array_equal(values[:, 1], table[f"r1.{letter}_x"])
+        with pytest.raises(RecordError, match="give accelerations instead"):
+            read_csv(name)
 
 
 def test_relative_accelerations_as_at2(here, hytf):

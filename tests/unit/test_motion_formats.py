@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: MIT
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -107,6 +109,108 @@ def test_csv_with_times(write, text):
     assert np.array_equal(record.acceleration, GRAVITY * np.array([1.0, -2.5, 3.0]))
 
 
+SAID = [
+    ("time_s,acceleration_m_s2", "m/s2"),
+    ("time [s],Acceleration [m/s²]", "m/s2"),
+    ("Time (s);acc (m/sec^2)", "m/s2"),
+    ("t\tacceleration in m/s/s", "m/s2"),
+    ("Time (s) Acceleration (m s-2)", "m/s2"),
+    ("t,a_mps2", "m/s2"),
+    ("# Time (s),Acceleration (m/s**2)", "m/s2"),
+    ("# a record [m/s2]\ntime_s,acceleration", "m/s2"),
+    ("time [s],acceleration [g]", "g"),
+    ("time_s,acc_g", "g"),
+    ("t,G", "g"),
+    ("# Time (s),Acceleration (g's)", "g"),
+    ("# a record [g]\ntime_s,acceleration", "g"),
+]
+SILENT = ["time_s,acceleration", "t,a_g", "t,acc_in", "time_s,acc (EW)", "# in Gravesend (m)\nt,a"]
+SILENT += ["# Time history, velocity to 30 cm/s\nt,a", "# Time, at a depth of 3, (m)\nt,a"]
+VALUES_OF_TWO = "\n0.0,1\n0.5,2\n"
+
+
+@pytest.mark.parametrize(("names", "unit"), SAID)
+def test_names_of_columns_state_the_unit(write, names, unit):
+    factor = {"g": GRAVITY, "m/s2": 1.0}
+    path = write(names + VALUES_OF_TWO)
+    for given in (None, unit):
+        assert read_csv(path, units=given).acceleration[0] == factor[unit]
+    other = "g" if unit == "m/s2" else "m/s2"
+    advice = f'expected accelerations in {other}, as units = "{other}" says; give units = "{unit}"'
+    with pytest.raises(RecordError, match=re.escape(advice)):
+        read_csv(path, units=other)
+
+
+@pytest.mark.parametrize("names", SILENT)
+def test_names_of_columns_that_state_no_unit(write, names):
+    path = write(names + VALUES_OF_TWO)
+    assert read_csv(path).acceleration[0] == GRAVITY
+    assert read_csv(path, units="m/s2").acceleration[0] == 1.0
+
+
+def test_the_unit_of_a_lone_column_and_in_latin_1(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes("Beschl. (m/s²)\n1\n2\n".encode("latin-1"))
+    assert read_csv(path, dt=0.1).acceleration[0] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("names", "advice"),
+    [
+        ("time,acceleration (cm/s2)", "divide the values by 100"),
+        ("time_s,acc_gal", "divide the values by 100"),
+        ("t,cm_s2", "divide the values by 100"),
+        ("t,acc_mg", "convert the values"),
+        ("t,acc (%g)", "convert the values"),
+        ("t,acceleration [ft/s^2]", "convert the values"),
+        ("time,velocity (cm/s)", "differentiate the values once"),
+        ("time_s,v_m_s", "differentiate the values once"),
+        ("time_s,velocity", "give accelerations instead"),
+        ("time (s),u (m)", "differentiate the values twice"),
+        ("# Time (s),Displacement", "give accelerations instead"),
+        ("time (ms),acceleration", "give the times in s"),
+        ("time_msec,acceleration (g)", "give the times in s"),
+        ("sample,acceleration", "give the times in s, or the accelerations alone"),
+        ("Frequency (Hz),acceleration (g)", "give the times in s, or the accelerations alone"),
+    ],
+)
+def test_columns_of_something_else(write, names, advice):
+    path = write(names + VALUES_OF_TWO)
+    for units in (None, "m/s2"):
+        with pytest.raises(RecordError, match=rf"line 1: found .*; {re.escape(advice)}"):
+            read_csv(path, units=units)
+
+
+def test_lines_that_state_two_units(write):
+    path = write("# a record [g]\ntime_s,acc_m_s2" + VALUES_OF_TWO)
+    with pytest.raises(RecordError, match=r"line 2: .*in g, as line 1 says"):
+        read_csv(path)
+
+
+@pytest.mark.parametrize("row", ["0,01;0,5", "0,01\t0,5", "0;-1,5e-3"])
+def test_decimal_commas(write, row):
+    with pytest.raises(RecordError, match="line 2: found decimal commas"):
+        read_csv(write(f"Zeit [s];a\n{row}\n0,02;0,6\n"))
+
+
+def test_text_in_utf_16(tmp_path):
+    for name in ("a.csv", "a.at2"):
+        (tmp_path / name).write_bytes("0.0,1\n0.1,2\n".encode("utf-16"))
+        with pytest.raises(RecordError, match="found text in UTF-16; expected text in UTF-8"):
+            read(tmp_path / name)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "a.csv")  # which nothing is ever written to
+    with pytest.raises(RecordError, match="found no regular file"):
+        read(tmp_path / "a.csv")
+
+
+def test_exponents_of_fortran(write):
+    record = read_at2(write(NEW + BODY.replace("E", "D").replace("e", "d"), "a.at2"))
+    assert np.array_equal(record.acceleration, GRAVITY * VALUES)
+
+
 def test_csv_of_one_column(write):
     path = write("acceleration\n1\n-2.5\n3\n")
     record = read_csv(path, dt=0.02, units="m/s2")
@@ -212,6 +316,6 @@ def test_read_chooses_by_suffix(write):
 
 def test_at2_takes_neither_dt_nor_units(write):
     path = write(NEW + BODY, "a.at2")
-    for wrong in ({"dt": 0.01}, {"units": "m/s2"}):
-        with pytest.raises(RecordError, match="expected neither"):
+    for wrong, said in (({"dt": 0.01}, "dt = 0.01"), ({"units": "m/s2"}, "units = 'm/s2'")):
+        with pytest.raises(RecordError, match=f"together with {said}; expected neither"):
             read(path, **wrong)

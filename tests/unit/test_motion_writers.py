@@ -37,6 +37,8 @@ def test_csv_comes_back(tmp_path_factory, values, dt, units):
     write_csv(path, Record(np.array(values), dt), units)
     record = read_csv(path, units=units)
     assert record.dt == pytest.approx(dt, rel=1e-11)  # times have twelve digits
+    # the file states its unit
+    np.testing.assert_array_equal(read_csv(path).acceleration, record.acceleration)
     # division by g and multiplication with it
     np.testing.assert_allclose(record.acceleration, values, rtol=0 if units == "m/s2" else 3e-16)
 

@@ -421,6 +421,7 @@ def test_a_fault_reads_well():
         ("a.csv", "0,1\n0.01,2\n0.03,1\n", "a time step of"),
         ("a.csv", "1\n2\n3\n", "one column"),
         ("a.csv", "0,1\n0.01,\x1b[31m\n", "\\u001b[31m"),
+        ("a.csv", "t,velocity\n0,1\n0.01,2\n", "'t,velocity'"),
         ("a.txt", "1\n2\n", "suffix"),
     ],
 )
@@ -458,6 +459,14 @@ def test_a_file_that_is_no_scene(tmp_path, content, key, text):
 def test_a_file_that_cannot_be_read(tmp_path, name):
     with pytest.raises(SceneError, match="nothing that can be read"):
         Scene.load(tmp_path / name)
+
+
+@pytest.mark.parametrize("units", [3, [], ["g"], {"g": 1}, "cm/s2"])
+def test_units_of_another_kind_are_told_once(tmp_path, units):
+    (tmp_path / "a.csv").write_text("0,1\n0.01,2\n")
+    table = {"direction": "x", "file": "a.csv", "units": units}
+    got = faults(changed(motion=[table], solver=...), tmp_path)
+    assert [fault.key for fault in got] == ["motion[0].units"]
 
 
 def test_what_is_no_regular_file_is_not_opened(tmp_path):
