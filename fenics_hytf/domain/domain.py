@@ -246,10 +246,11 @@ def _mesh_data(scene: Scene | Sections) -> tuple[MeshData, list[Fault]]:
         for _ in range(mesh.refine):
             data = refined(data)
     faults = _unknown_regions(mesh.empty, data)
+    misnamed = len(faults)
     data = emptied(data, mesh.empty)
     if not data.region_names:
         faults.append(Fault("mesh.empty", "every region of the mesh", "one with soil"))
-    return data, faults if mesh.file is None else [*faults, *_file_faults(scene, data)]
+    return data, faults if mesh.file is None else [*faults, *_file_faults(scene, data, misnamed)]
 
 
 def _require_few(num_cells: int, refine: int) -> None:
@@ -268,11 +269,15 @@ def _unknown_regions(empty: tuple[str, ...], data: MeshData) -> list[Fault]:
     ]
 
 
-def _file_faults(scene: Scene | Sections, data: MeshData) -> Iterator[Fault]:
-    """What the scene says of a mesh file that the file does not hold."""
+def _file_faults(scene: Scene | Sections, data: MeshData, misnamed: int) -> Iterator[Fault]:
+    """What the scene says of a mesh file that the file does not hold.
+
+    Regions without soil are no fault of their own where as many names in ``mesh.empty`` are
+    wrong: they are the ones that were meant.
+    """
     soils = tuple(scene.soil)
     missing = [name for name in data.region_names if name not in soils]
-    if missing:
+    if len(missing) > misnamed:
         yield Fault("mesh.file", f"regions {', '.join(missing)}", "a soil for each")
     names = (*data.planes, *data.facets)
     known = ", ".join(names)

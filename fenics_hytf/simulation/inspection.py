@@ -215,8 +215,10 @@ def _locking_notes(scene: Scene, domain: Domain) -> Iterator[str]:
     for name in domain.region_names:
         poisson = scene.soil[name].elastic.poisson
         if poisson >= _NEARLY_INCOMPRESSIBLE:
+            told = f"{poisson:g}"
+            told = repr(poisson) if float(told) == 0.5 else told  # which it is not
             yield (
-                f"soil {name}: Poisson's ratio is {poisson:g}, at which cells lock; the cure is "
+                f"soil {name}: Poisson's ratio is {told}, at which cells lock; the cure is "
                 f"{cure}effects.locking = true"
             )
 

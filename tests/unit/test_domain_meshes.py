@@ -33,6 +33,7 @@ base = "rigid"
 [output]
 receivers = { middle = [2.0, 1.0] }
 """
+CURVES = "{ strain = [1e-6, 1e-2], modulus = [1.0, 0.1], damping = [0.01, 0.2] }"
 VERSIONS = pytest.mark.parametrize("version", [2.2, 4.1])
 
 
@@ -50,6 +51,7 @@ def check(tmp_path, monkeypatch, capsys):
         assert "Traceback" not in err
         assert (stop.value.code, out) == (2, "") if err else stop.value.code == 0
         said = [line.removeprefix("hytf: ").split(": ", 1) for line in err.splitlines()]
+        assert len({key for key, _ in said}) == len(said)
         return dict(said)
 
     return call
@@ -138,6 +140,26 @@ def test_groups_of_which_none_has_a_name(check, version):
 def test_a_region_without_soil(check):
     section([("clay", 2, [1]), ("silt", 2, [2]), BASE])
     assert check() == {"mesh.file": "found regions silt; expected a soil for each"}
+
+
+def test_an_empty_region_of_another_name_is_told_once(check):
+    section([("clay", 2, [1]), ("air", 2, [2]), BASE])
+    expected = "found 'sky', no region of the mesh; expected one of air, clay"
+    assert check("--set", "mesh.empty=['sky']") == {"mesh.empty[0]": expected}
+    section([("silt", 2, [1]), ("air", 2, [2]), BASE])
+    assert set(check("--set", "mesh.empty=['sky']")) == {"mesh.empty[0]", "mesh.file"}
+
+
+def test_a_mesh_without_curves_is_told_once(check):
+    section([*SOILS, BASE])
+    loop = ("--set", "effects.equivalent_linear=true")
+    said = "found no soil with curves; expected curves"
+    assert check(*loop)["effects.equivalent_linear"] == f"{said} in one of the soils clay, sand"
+    # of a soil that the mesh lacks: the mesh alone shows it
+    chalk = SCENE.split("[soil.sand]")[1].split("[[motion]]")[0]
+    scene = SCENE.replace("[[motion]]", f"[soil.chalk]{chalk}curves = {CURVES}\n[[motion]]")
+    told = check(*loop, scene=scene)["effects.equivalent_linear"]
+    assert told == f"{said} for one of the mesh's soils, clay, sand"
 
 
 def test_a_boundary_that_the_mesh_lacks(check):

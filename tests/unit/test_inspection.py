@@ -180,6 +180,10 @@ def test_defaults_of_one_lapse_and_of_harmonics():
             ["under steady continuity the net movement"],
         ),
         (
+            {"soil": {**SAND, "poisson": 0.4999999999}},
+            ["soil sand: Poisson's ratio is 0.4999999999, at which cells lock"],
+        ),
+        (
             {"soil": {**SAND, "damping": 0.28}, "solver": {"complex_modulus": "hysteretic"}},
             ["hysteretic damping cannot be stopped"],
         ),
