@@ -281,7 +281,9 @@ def _csv_rows(
 def _column_names(text: str) -> list[str]:
     """Names of columns, apart by a comma or the like, else by white space before a letter."""
     separator = next((s for s in ",;\t" if s in text), None)
-    return text.split(separator) if separator else re.split(r"\s+(?=[^\W\d_])", text, maxsplit=1)
+    if separator:
+        return text.split(separator)
+    return re.split(r" (?=[^\W\d_])", " ".join(text.split()), maxsplit=1)
 
 
 def _names_in_comment(text: str) -> list[str]:

@@ -18,8 +18,10 @@ UNITS = {"g": GRAVITY, "m/s2": 1.0}
 _SQUARED = r"(?:[/_. ]?s[_ ]?-?2|[/_. ]s[/_. ]s|ps2|_per_s2)"  # over s², s/s, in words
 _OTHER_LENGTH = r"(?:km|dm|cm|mm|ft|in)"
 _ENDS_IN_G = re.compile(r"(?:.*[^a-z])?acc[a-z.]*[_ ]+(?:in )?(m?g'?s?)")
-_BRACKETS = re.compile(r"[\[(]\s*([^\[\]()]*?)\s*[\])]")
+_BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 _WRITTEN_OTHERWISE = str.maketrans({"²": "2", "⁻": "-", "·": ".", "^": None, "*": None})
+
+_LONGEST = 200  # characters of a name that are looked at: what is longer is no name
 
 _UNIT = {"m/s2": re.compile(rf"m{_SQUARED}"), "g": re.compile(r"g'?s?")}
 _REFUSED = {
@@ -90,7 +92,7 @@ def names_time(name: str) -> bool:
 
 def _plain(name: str) -> str:
     """A name in one way of writing; a byte that is not UTF-8 after s is the ² of Latin 1."""
-    text = name.strip().lower().translate(_WRITTEN_OTHERWISE).replace("s\ufffd", "s2")
+    text = name.strip()[:_LONGEST].lower().translate(_WRITTEN_OTHERWISE).replace("s\ufffd", "s2")
     return re.sub(r"(?<![a-z])sec(?:onds?)?(?=[^a-z]|$)", "s", text)
 
 
@@ -98,7 +100,7 @@ def _candidates(text: str, shortest: int = 1) -> Iterator[str]:
     """Where a unit may stand: in brackets; else the whole, or its end after ``_`` or a space."""
     in_brackets = _BRACKETS.findall(text)
     if in_brackets:
-        yield from in_brackets
+        yield from map(str.strip, in_brackets)
         return
     yield text
     for cut in re.finditer("[_ ]", text):

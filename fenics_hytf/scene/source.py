@@ -34,7 +34,8 @@ def read_source(
         The table, or ``None`` if the file cannot be read; and the faults.
     """
     if unusable(path) == IRREGULAR:
-        return None, [Fault(str(path), f"nothing that can be read ({IRREGULAR})", "a scene file")]
+        found = f"something {IRREGULAR}"
+        return None, [Fault(str(path), found, "a scene file")]
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -181,6 +181,13 @@ def test_columns_of_something_else(write, names, advice):
             read_csv(path, units=units)
 
 
+@pytest.mark.timeout(10)  # each would take minutes in a time that grows with the square
+@pytest.mark.parametrize("piece", ["a_", "a ", "(", "[ ", "acc ", "\t", "m/s"])
+def test_a_line_without_end_is_no_name_to_ponder(write, piece):
+    path = write("x" + 300_000 * piece + "y" + VALUES_OF_TWO)
+    assert read_csv(path).dt == 0.5
+
+
 def test_lines_that_state_two_units(write):
     path = write("# a record [g]\ntime_s,acc_m_s2" + VALUES_OF_TWO)
     with pytest.raises(RecordError, match=r"line 2: .*in g, as line 1 says"):

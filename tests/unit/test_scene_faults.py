@@ -455,7 +455,7 @@ def test_a_file_that_is_no_scene(tmp_path, content, key, text):
     assert fault.key == str(tmp_path / key) and text in fault.expected
 
 
-@pytest.mark.parametrize("name", ["none.toml", ".", "a\0b"])
+@pytest.mark.parametrize("name", ["none.toml", "a\0b"])
 def test_a_file_that_cannot_be_read(tmp_path, name):
     with pytest.raises(SceneError, match="nothing that can be read"):
         Scene.load(tmp_path / name)
@@ -472,9 +472,9 @@ def test_units_of_another_kind_are_told_once(tmp_path, units):
 def test_what_is_no_regular_file_is_not_opened(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)  # which nothing is ever written to
-    with pytest.raises(SceneError, match="which is no regular file"):
-        Scene.load(pipe)
     for path in (pipe, tmp_path, "/dev/zero"):
+        with pytest.raises(SceneError, match="found something which is no regular file"):
+            Scene.load(path)
         got = faults(
             changed(mesh={"file": str(path)}, motion__0={"direction": "x", "file": str(path)})
         )
