@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fenics_hytf.cli.outcome import DONE, INPUT, InputError, say, tell
 from fenics_hytf.motion import Record, write_at2, write_columns, write_csv
-from fenics_hytf.results import ResultError, as_written, folder_faults, read_summary, read_tables
+from fenics_hytf.results import ResultError, as_written, place_faults, read_summary, read_tables
 from fenics_hytf.results.summary import moving_components
 from fenics_hytf.results.writers import QUANTITIES
 
@@ -159,7 +159,7 @@ def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Mo
 def _check_place(folder: Path, files: Sequence[str], force: bool) -> None:
     """Raise InputError where the files cannot or must not be written."""
     faults = [] if files else ["RECEIVER: found none that moves; expected a motion to write"]
-    faults += folder_faults(folder, force=True)
+    faults += place_faults(folder)
     there = [file for file in files if os.path.lexists(folder / file)]
     if there and not force:
         faults.append(

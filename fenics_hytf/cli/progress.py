@@ -3,6 +3,7 @@
 
 How long a lapse takes is known once its equivalent-linear loop has ended, not before. The fraction
 done assumes as many iterations as the lapse before took, ten for the first, and never goes back.
+After the last lapse it is said what is written, without a time left.
 """
 
 from __future__ import annotations
@@ -18,6 +19,9 @@ from fenics_hytf.cli.outcome import say
 
 if TYPE_CHECKING:
     from fenics_hytf.simulation import Progress, ProgressCallback
+
+AFTERWARDS = {"tables": "writing tables", "figures": "drawing figures and the report"}
+"""Phases after the last lapse, and how they are told; how long they take is not estimated."""
 
 _FIRST_GUESS = 10  # iterations of the first lapse
 _SLOWER = 1.5  # a loop that takes longer is taken to need half as much again
@@ -39,7 +43,7 @@ class Estimate:
         """Take in a report; the free field of a side takes next to no time."""
         if self._before is None:
             self._before = progress.lapse / progress.num_lapses
-        if progress.side:
+        if progress.side or progress.phase in AFTERWARDS:
             return
         within = progress.done / progress.total if progress.total else 0.0
         if progress.phase == "lapse":
@@ -63,6 +67,8 @@ class Estimate:
 
 def describe(progress: Progress) -> str:
     """A report in words."""
+    if progress.phase in AFTERWARDS:
+        return AFTERWARDS[progress.phase]
     parts = [f"lapse {progress.lapse} ({progress.lapse + 1} of {progress.num_lapses})"]
     if progress.side:
         parts.append(f"free field at {progress.side}")
@@ -91,7 +97,10 @@ def duration(seconds: float | None) -> str:
 
 
 class PlainLines:
-    """One line an iteration; otherwise at most one a second. The last lapse's end is said."""
+    """One line an iteration; otherwise at most one a second.
+
+    The end of the last lapse is said, and what follows it.
+    """
 
     def __init__(self, stream: TextIO, clock: Callable[[], float] = time.monotonic) -> None:
         self._stream = stream
@@ -103,7 +112,9 @@ class PlainLines:
         """Take in a report."""
         self._estimate.update(progress)
         now = self._clock()
-        ends = progress.phase == "lapse" and progress.lapse + 1 == progress.num_lapses
+        ends = progress.phase in AFTERWARDS or (
+            progress.phase == "lapse" and progress.lapse + 1 == progress.num_lapses
+        )
         iterated = progress.phase == "iteration" and not progress.side
         if iterated or ends or now - self._last >= 1.0:
             self._last = now

@@ -6,6 +6,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
@@ -40,6 +41,8 @@ from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import (
     CheckpointError,
     CheckpointFolder,
+    Progress,
+    ProgressCallback,
     Result,
     SimulationError,
     Snapshot,
@@ -121,9 +124,12 @@ def run_scene(request: RunRequest, comm: MPI.Comm) -> int:
     folder = at_root(comm, lambda: open_result(request.folder, force, request.resume))
     try:
         checkpoint = _checkpoint(request, scene, folder, comm)
-        with interruptible(comm, lambda: _farewell(checkpoint, scene), lambda: _close(folder)):
-            result = _simulate(request, scene, folder, checkpoint, comm)
-            summary = at_root(comm, lambda: _finish(request, folder, result))
+        with (
+            interruptible(comm, lambda: _farewell(checkpoint, scene), lambda: _close(folder)),
+            show_progress(quiet=request.quiet or comm.rank != 0) as progress,
+        ):
+            result = _simulate(request, scene, folder, checkpoint, progress, comm)
+            summary = at_root(comm, lambda: _finish(request, folder, progress, result))
     finally:
         _close(folder)
     if summary is not None and not request.quiet:
@@ -223,31 +229,48 @@ def _simulate(
     scene: Scene,
     folder: ResultFolder | None,
     checkpoint: CheckpointFolder,
+    progress: ProgressCallback | None,
     comm: MPI.Comm,
 ) -> Result:
     def snapshot(snapshot: Snapshot) -> None:
         at_root(comm, lambda: folder.snapshot(snapshot) if folder is not None else None)
 
-    with show_progress(quiet=request.quiet or comm.rank != 0) as progress:
-        try:
-            return simulate(
-                scene,
-                comm,
-                progress,
-                snapshot,
-                group_size=request.group_size,
-                checkpoint=checkpoint,
-            )
-        except SimulationError as error:
-            partial = error.partial
-            if partial is not None:
-                at_root(comm, lambda: folder and folder.write_partial(partial))
-            raise
+    try:
+        return simulate(
+            scene,
+            comm,
+            progress,
+            snapshot,
+            group_size=request.group_size,
+            checkpoint=checkpoint,
+        )
+    except SimulationError as error:
+        partial = error.partial
+        if partial is not None:
+            at_root(comm, lambda: folder and folder.write_partial(partial))
+        raise
 
 
-def _finish(request: RunRequest, folder: ResultFolder | None, result: Result) -> dict[str, Any]:
+def _finish(
+    request: RunRequest,
+    folder: ResultFolder | None,
+    progress: ProgressCallback | None,
+    result: Result,
+) -> dict[str, Any]:
+    """Write the result; of a long record, or for many receivers, that takes minutes."""
     assert folder is not None  # rank 0 holds it
-    return folder.write(result, publish if request.plots else None)
+    lapses = len(result.lapses)
+
+    def tell_phase(phase: str) -> None:
+        if progress is not None:
+            progress(Progress(lapses - 1, lapses, phase))
+
+    def draw(path: Path, summary: dict[str, Any]) -> None:
+        tell_phase("figures")
+        publish(path, summary)
+
+    tell_phase("tables")
+    return folder.write(result, draw if request.plots else None)
 
 
 def _close(folder: ResultFolder | None) -> None:

@@ -8,6 +8,7 @@ either name is replaced, not written through: a link that someone left in the fo
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -46,6 +47,26 @@ def replacing(path: Path) -> Iterator[Path]:
 def part_of(path: Path) -> Path:
     """Where a file stands until it is whole; a run that is killed leaves it there."""
     return path.with_name(f".{path.name}")
+
+
+def fault_of_place(folder: Path) -> str:
+    """What is wrong with what stands where a folder is to be written in.
+
+    Args:
+        folder: The folder.
+
+    Returns:
+        That it is a file, or a link, which would lead elsewhere; empty if it is a folder, or
+        nothing is there.
+    """
+    try:
+        mode = folder.lstat().st_mode
+    except OSError:
+        return ""
+    if stat.S_ISDIR(mode):
+        return ""
+    found = "a link" if stat.S_ISLNK(mode) else "a file"
+    return f"{folder}: found {found}; expected a folder, or nothing. Remove it"
 
 
 def replace_file(path: Path, text: str) -> None:

@@ -15,6 +15,7 @@ from fenics_hytf.results.folder import (
     is_result_of,
     locked,
     open_result,
+    place_faults,
 )
 from fenics_hytf.results.publish import publish
 from fenics_hytf.results.reader import (
@@ -38,6 +39,7 @@ __all__ = [
     "locked",
     "moving_components",
     "open_result",
+    "place_faults",
     "publish",
     "read_result",
     "read_summary",

@@ -22,7 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
-from fenics_hytf.motion.files import part_of, replace_file
+from fenics_hytf.motion.files import fault_of_place, part_of, replace_file
 from fenics_hytf.results.paraview import write_snapshot
 from fenics_hytf.results.summary import summarise
 from fenics_hytf.results.writers import write_tables
@@ -92,12 +92,28 @@ def folder_faults(folder: Path, force: bool, resume: bool = False) -> list[str]:
                 f"{folder}: found a finished result ({FINISHED}); expected a folder without one. "
                 "Choose another with -o, or replace it with --force"
             ]
+        fault = fault_of_place(folder / CHECKPOINT)
+        if fault:
+            return [f"{fault}, or choose another folder with -o"]
         if not (force or resume) and any(folder.glob(_CHECKPOINTS)):
             return [
                 f"{folder}: found an unfinished run (it has a {CHECKPOINT}); expected a folder "
                 "without one. Go on with --resume, start anew with --force, or choose another "
                 "with -o"
             ]
+    return place_faults(folder)
+
+
+def place_faults(folder: Path) -> list[str]:
+    """What speaks against writing anything to a folder; touches nothing.
+
+    Args:
+        folder: The folder; it may be missing.
+
+    Returns:
+        The faults, empty if there are none.
+    """
+    if os.path.isdir(folder):
         place = folder
     else:
         place = next(p for p in (folder, *folder.absolute().parents) if os.path.lexists(p))

@@ -28,7 +28,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 import fenics_hytf
-from fenics_hytf.motion.files import replacing
+from fenics_hytf.motion.files import fault_of_place, replacing
 from fenics_hytf.scene import Fault, Scene, SceneError, changed_keys, identity
 from fenics_hytf.simulation.errors import CheckpointError
 from fenics_hytf.simulation.packing import Arrays, pack, unpack
@@ -163,6 +163,20 @@ def require_sound(checkpoint: Checkpoint, path: Path) -> None:
         raise CheckpointError(_damage(path / FILE, found))
 
 
+def require_place(folder: Path) -> None:
+    """Refuse what is no folder where a checkpoint is to be kept: a file, or a link elsewhere.
+
+    Args:
+        folder: The checkpoint's folder; it may be missing.
+
+    Raises:
+        CheckpointError: With what is there.
+    """
+    fault = fault_of_place(folder)
+    if fault:
+        raise CheckpointError(fault)
+
+
 def write_checkpoint(
     folder: Path, meta: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]
 ) -> None:
@@ -176,6 +190,7 @@ def write_checkpoint(
     Raises:
         CheckpointError: It could not be written.
     """
+    require_place(folder)
     path = folder / FILE
     try:
         if not folder.is_dir():

@@ -14,6 +14,7 @@ from fenics_hytf.simulation.checkpoint import (
     FILE,
     Checkpoint,
     read_checkpoint,
+    require_place,
     require_same_scene,
     require_sound,
     take_checkpoint,
@@ -41,7 +42,7 @@ class CheckpointFolder:
             where it starts at the first lapse.
 
     Raises:
-        CheckpointError: The checkpoint cannot be read.
+        CheckpointError: The checkpoint cannot be read, or its place is no folder.
         SceneError: It is of another scene, with every key that differs. Each on every rank.
     """
 
@@ -57,7 +58,7 @@ class CheckpointFolder:
         self._scene = scene
         self._comm = comm
         self._first = first
-        self.found: Checkpoint | None = self._at_root(self._read) if resume else None
+        self.found: Checkpoint | None = self._at_root(lambda: self._read(resume))
         self._lapse = None if self.found is None else self.found.lapse
         # a lapse that is being kept, and the file that its own replaces
         self._coming: tuple[int, tuple[int, int] | None] | None = None
@@ -127,8 +128,9 @@ class CheckpointFolder:
         self._lapse = lapse
         self._coming = self.found = None
 
-    def _read(self) -> Checkpoint | None:
-        found = read_checkpoint(self.path)
+    def _read(self, resume: bool) -> Checkpoint | None:
+        require_place(self.path)
+        found = read_checkpoint(self.path) if resume else None
         if found is not None:
             require_sound(found, self.path)
             require_same_scene(found, self._scene)

@@ -75,7 +75,9 @@ class Progress:
     Attributes:
         lapse: Number of the lapse, from 0.
         num_lapses: How many there are.
-        phase: ``"sweep"``, ``"iteration"``, ``"lapse"`` (a lapse is done).
+        phase: ``"sweep"``, ``"iteration"``, ``"lapse"`` (a lapse is done); after the last one what
+            is done with the result may report too, as ``hytf run`` does: ``"tables"``,
+            ``"figures"``.
         iteration: Equivalent-linear iteration, from 1 (0 without the loop).
         done: Lines solved in the running sweep.
         total: Lines of the running sweep.

@@ -184,10 +184,19 @@ def test_an_interrupt_leaves_the_one_before(tmp_path, monkeypatch):
     assert_same(read_checkpoint(tmp_path), ARRAYS)
 
 
+def test_a_link_leads_no_checkpoint_elsewhere(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "checkpoint").symlink_to("elsewhere")
+    with pytest.raises(CheckpointError, match="found a link"):
+        write_checkpoint(tmp_path / "checkpoint", {}, {})
+    assert not any((tmp_path / "elsewhere").iterdir())
+
+
 def test_a_place_that_cannot_be_written(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(CheckpointError, match="cannot be written"):
-        write_checkpoint(tmp_path / "file", META, ARRAYS)
+    for place, words in (("file", "found a file"), ("file/below", "cannot be written")):
+        with pytest.raises(CheckpointError, match=words):
+            write_checkpoint(tmp_path / place, META, ARRAYS)
     assert read_checkpoint(tmp_path / "file") is None
     (tmp_path / FILE).mkdir()
     with pytest.raises(CheckpointError, match="cannot be read"):

@@ -101,6 +101,19 @@ def test_a_bar_on_a_terminal():
     assert "lapse 0" in stream.getvalue() and "\x1b[" in stream.getvalue()
 
 
+def test_what_is_written_after_the_last_lapse_is_told():
+    """Of a record of a million samples it takes minutes in which naively nothing is said."""
+    stream, lines = Terminal(), io.StringIO()
+    plain = PlainLines(lines, Clock())
+    with show_progress(False, stream) as bar:
+        for progress in (*run_of(1, 2), Progress(0, 1, "tables"), Progress(0, 1, "figures")):
+            bar(progress)
+            plain(progress)
+    words = ["writing tables", "drawing figures and the report"]
+    assert lines.getvalue().splitlines()[-2:] == words
+    assert words[1] in stream.getvalue()  # the bar is drawn at most ten times a second
+
+
 def test_quiet():
     stream = Terminal()
     with show_progress(True, stream) as callback:

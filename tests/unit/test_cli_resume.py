@@ -113,6 +113,28 @@ def test_without_a_checkpoint_it_starts_anew(here, hytf, march):
     assert done == [0, 1, 2]
 
 
+@pytest.mark.parametrize("arguments", [(), ("--resume",), ("--force",), ("--resume", "--force")])
+@pytest.mark.parametrize("kind", ["file", "link"])
+def test_what_is_no_folder_where_the_checkpoint_goes_is_refused(here, hytf, march, kind, arguments):
+    """Naively a lapse is solved first, or the checkpoint is written to another folder."""
+    done = march()
+    Path("mine").mkdir()
+    Path("mine/old.npz").write_text("mine")
+    place = Path("s-result/checkpoint")
+    place.parent.mkdir()
+    if kind == "file":
+        place.write_text("mine")
+    else:
+        place.symlink_to(here / "mine")
+    code, out, err = hytf("run", "s.toml", *arguments)
+    assert (code, out, done) == (2, "", [])
+    assert err == (
+        f"hytf: s-result/checkpoint: found a {kind}; expected a folder, or nothing. Remove it, or "
+        "choose another folder with -o\n"
+    )
+    assert files("mine") == ["old.npz"] and len(list(place.parent.iterdir())) == 1
+
+
 def test_force_starts_anew_and_removes_the_checkpoint(here, hytf, march):
     march(stop=2, error=KeyboardInterrupt())
     hytf("run", "s.toml")
