@@ -17,15 +17,12 @@ from fenics_hytf.cli.outcome import DONE, INPUT, InputError, say, tell
 from fenics_hytf.motion import Record, write_at2, write_columns, write_csv
 from fenics_hytf.results import ResultError, as_written, place_faults, read_summary, read_tables
 from fenics_hytf.results.summary import moving_components
-from fenics_hytf.results.writers import QUANTITIES
+from fenics_hytf.results.writers import BASE_KINDS, QUANTITIES
 
 RealArray = npt.NDArray[np.float64]
 
 FORMATS = ("at2", "csv")
 TOTAL = "total_acceleration"
-BASE = ("within", "outcrop")
-"""Names of the base's motions; no receiver has them."""
-
 _LETTERS = {name: letter for letter, name in QUANTITIES.items()}
 _UNITS = {"displacement": "m", "velocity": "m/s"}
 
@@ -126,14 +123,12 @@ def _request_faults(request: ExportRequest, summary: Mapping[str, Any]) -> list[
 def _base_names(summary: Mapping[str, Any]) -> list[str]:
     """Motions of the base that are known."""
     base = summary["base"].values()
-    return [kind for kind in BASE if all(b[f"{kind}_pga_g"] is not None for b in base)]
+    return [kind for kind in BASE_KINDS if all(b[f"{kind}_pga_g"] is not None for b in base)]
 
 
 def _motions(request: ExportRequest, summary: Mapping[str, Any]) -> Iterator[_Motion]:
     """The motions asked for: of receivers all components that move, of the base the driven ones."""
-    receivers, base = read_tables(request.folder, "receivers", "base")
-    if not summary["dt_s"] > 0:
-        raise ValueError(f"found a time step of {summary['dt_s']}")
+    receivers, base = read_tables(request.folder, summary, "receivers", "base")
     letter = _LETTERS[request.quantity]
     what = request.quantity.replace("_", " ")
     what = what if request.quantity == TOTAL else f"{what} relative to the base"

@@ -36,6 +36,7 @@ from fenics_hytf.results import (
     is_result_of,
     open_result,
     publish,
+    read_summary,
 )
 from fenics_hytf.scene import Scene, SceneError
 from fenics_hytf.simulation import (
@@ -173,8 +174,9 @@ def _folder_faults(request: RunRequest, scene_hash: str, force: bool) -> list[st
 
 
 def _is_finished(request: RunRequest, scene_hash: str) -> bool:
-    """Whether a run that is to be gone on with has come to its end."""
-    return request.resume and not request.force and is_result_of(request.folder, scene_hash)
+    """Whether a run that is to be gone on with has come to its end; ResultError if it is broken."""
+    finished = request.resume and not request.force and is_result_of(request.folder, scene_hash)
+    return finished and bool(read_summary(request.folder))
 
 
 def _checkpoint(

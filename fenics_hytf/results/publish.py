@@ -6,11 +6,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from fenics_hytf.motion.files import replace_file, replacing
 from fenics_hytf.results.reader import read_result
+
+REPORT = "report.html"
 
 
 def publish(folder: Path, summary: dict[str, Any] | None = None) -> list[str]:
     """Draw the figures of a result and write ``report.html``, all into its folder.
+
+    They are put there once all are drawn: those of before stay where one cannot be.
 
     Args:
         folder: Holds the tables, and ``summary.json`` unless the summary is given.
@@ -24,9 +29,13 @@ def publish(folder: Path, summary: dict[str, Any] | None = None) -> list[str]:
     """
     # matplotlib takes half a second to load; runs without figures do without
     from fenics_hytf.results.figures.drawing import draw_figures
-    from fenics_hytf.results.report.document import write_report
+    from fenics_hytf.results.report.document import report
 
     stored = read_result(folder, summary)
     drawings = draw_figures(stored)
-    write_report(stored, drawings)
-    return [drawing.file for drawing in drawings] + ["report.html"]
+    page = report(stored, drawings)
+    for drawing in drawings:
+        with replacing(folder / drawing.file) as part:
+            part.write_bytes(drawing.picture)
+    replace_file(folder / REPORT, page)
+    return [*(drawing.file for drawing in drawings), REPORT]

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,15 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf.results.columns import TABLES, Table, require_fit
 from fenics_hytf.results.folder import FINISHED, ResultError, check_finished
+from fenics_hytf.results.schema import summary_faults
 from fenics_hytf.results.summary import FORMAT
 
 RealArray = npt.NDArray[np.float64]
-Table = Mapping[str, npt.NDArray[Any]]
-
-_TABLES = ("receivers", "base", "transfer", "spectra", "cells")
-NAME = re.compile(r"[\w-]+")
-"""Of receivers, directions and components, as the scene allows them."""
 
 _BLOCK = 20_000  # rows converted at once
 
@@ -85,8 +81,8 @@ def read_result(folder: Path, summary: dict[str, Any] | None = None) -> StoredRe
     """
     if summary is None:
         summary = read_summary(folder)
-    tables = _TABLES if summary["sliding"] is None else (*_TABLES, "slip")
-    return StoredResult(folder, summary, *read_tables(folder, *tables))
+    tables = TABLES if summary["sliding"] is None else (*TABLES, "slip")
+    return StoredResult(folder, summary, *read_tables(folder, summary, *tables))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
@@ -99,7 +95,8 @@ def read_summary(folder: Path) -> dict[str, Any]:
         The summary.
 
     Raises:
-        ResultError: If the folder holds no finished result, or one of another format.
+        ResultError: If the folder holds no finished result, or one of another format, or values
+            that no run writes; with their keys.
     """
     check_finished(folder)
     with readable(folder):
@@ -107,26 +104,34 @@ def read_summary(folder: Path) -> dict[str, Any]:
         found = summary.get("format") if isinstance(summary, dict) else None
         if found != FORMAT:
             raise ValueError(f"{FINISHED} is of format {found}, this version reads {FORMAT}")
-        with as_written(folder):
-            _refuse_odd_names(summary)
+        faults = summary_faults(summary)
+        if faults:
+            more = f", and {len(faults) - 1} more" if faults[1:] else ""
+            raise ValueError(f"{FINISHED}, {faults[0]}{more}")
     return dict(summary)
 
 
-def read_tables(folder: Path, *names: str) -> list[Table]:
-    """Read tables of a result.
+def read_tables(folder: Path, summary: Mapping[str, Any], *names: str) -> list[Table]:
+    """Read tables of a result, and see to it that they are what its summary tells of.
 
     Args:
         folder: The folder.
+        summary: Its summary.
         names: Of the tables, without ``.csv``.
 
     Returns:
         The tables in that order.
 
     Raises:
-        ResultError: If one is missing or broken.
+        ResultError: If one is missing or broken, or has other columns or rows.
     """
+    tables: list[Table] = []
     with readable(folder):
-        return [read_table(folder / f"{name}.csv") for name in names]
+        for name in names:
+            table = read_table(folder / f"{name}.csv")
+            require_fit(name, table, summary)
+            tables.append(table)
+    return tables
 
 
 @contextmanager
@@ -142,29 +147,21 @@ def readable(folder: Path) -> Iterator[None]:
 def as_written(folder: Path) -> Iterator[None]:
     """Turn what a result that no run wrote makes of its readers into a message.
 
-    A summary and tables are told by hundreds of names; they are not looked through beforehand.
+    Types, columns and rows are looked at beforehand; that all values belong together is not.
     """
     try:
         yield
     except ResultError:
         raise
     except (LookupError, TypeError, AttributeError, ArithmeticError, ValueError) as error:
-        raise _unreadable(folder, f"{type(error).__name__}: {error}") from error
+        raise _unreadable(folder, "its values do not belong together") from error
 
 
 def _unreadable(folder: Path, reason: object) -> ResultError:
     return ResultError(
         f"{folder}: found a result that cannot be read ({reason}); expected the files as a run "
-        "of this version wrote them. Run the scene again"
+        "of this version wrote them. Run the scene again, with --force"
     )
-
-
-def _refuse_odd_names(summary: Mapping[str, Any]) -> None:
-    """Raise ValueError for names that end up in names of files and are none that a scene allows."""
-    names = [*summary["receivers"], *summary["directions"], *summary["components"]]
-    for name in names:
-        if not (isinstance(name, str) and NAME.fullmatch(name)):
-            raise ValueError(f"{FINISHED} has the name {name!r:.40}")
 
 
 def read_table(path: Path) -> dict[str, npt.NDArray[Any]]:
@@ -178,11 +175,14 @@ def read_table(path: Path) -> dict[str, npt.NDArray[Any]]:
         (empty: NaN), else strings.
 
     Raises:
-        ValueError: If a row has more or fewer fields than the header.
+        ValueError: If two columns have the same name, or a row has more or fewer fields than the
+            header.
     """
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.reader(file)
         header = next(reader, [])
+        if len(set(header)) < len(header):
+            raise ValueError(f"{path.name} has two columns of the same name")
         blocks: list[list[npt.NDArray[Any]]] = []
         while rows := list(islice(reader, _BLOCK)):
             if any(len(row) != len(header) for row in rows):

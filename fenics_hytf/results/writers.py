@@ -36,6 +36,9 @@ QUANTITIES = {
 }
 """Letters in column names and what they stand for; ``A`` is total, the others are relative."""
 
+BASE_KINDS = ("within", "outcrop")
+"""Motions of the base; of the second there is none where the rock is not known."""
+
 SPECTRUM_DAMPING = 0.05
 SPECTRUM_PERIODS = default_periods()
 

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
 from matplotlib import colormaps
@@ -11,7 +11,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from fenics_hytf.motion.files import replacing
 from fenics_hytf.results.figures.plane import Plane, discs, draw_mesh, picture_size
 from fenics_hytf.results.figures.style import length_unit, spread
 from fenics_hytf.results.ground import StoredPoints, read_points, snapshot_lapses
@@ -30,21 +29,24 @@ _HOLD = 1500  # for which the last frame stays besides [ms]
 _GREYS = 32  # among 256 colours
 
 
-def animate(stored: StoredResult, plane: Plane, path: Path) -> None:
-    """Write the animation.
+def animate(stored: StoredResult, plane: Plane) -> bytes:
+    """Draw the animation.
 
     Args:
         stored: The result.
         plane: In which the points are shown.
-        path: The file.
+
+    Returns:
+        The content of a GIF file.
     """
     frames = _frames(stored)
-    _write(frames, plane, path)
-    while (size := path.stat().st_size) > MOST_BYTES and len(frames) > 2:
+    drawn = _draw(frames, plane)
+    while (size := len(drawn)) > MOST_BYTES and len(frames) > 2:
         # the figure around the points is in the first frame alone: size goes with their number
         fewer = max(2, int(0.9 * len(frames) * MOST_BYTES / size))
         frames = [frames[i] for i in spread(len(frames), fewer)]
-        _write(frames, plane, path)
+        drawn = _draw(frames, plane)
+    return drawn
 
 
 def _frames(stored: StoredResult) -> list[StoredPoints]:
@@ -57,7 +59,7 @@ def _frames(stored: StoredResult) -> list[StoredPoints]:
     return [StoredPoints(0.0, first.id, start, nought, first.volume), *frames]
 
 
-def _write(frames: list[StoredPoints], plane: Plane, path: Path) -> None:
+def _draw(frames: list[StoredPoints], plane: Plane) -> bytes:
     lengths = [np.linalg.norm(points.displacement, axis=1) for points in frames]
     largest = max(float(length.max(initial=0.0)) for length in lengths)
     factor, unit = length_unit(largest)
@@ -84,15 +86,17 @@ def _write(frames: list[StoredPoints], plane: Plane, path: Path) -> None:
         images.append(_image(figure))
     each = int(np.clip(_DURATION / len(images), *_A_FRAME))
     durations = [each] * (len(images) - 1) + [each + _HOLD]
-    with replacing(path) as part:
-        images[0].save(
-            part,
-            save_all=True,
-            append_images=images[1:],
-            duration=durations,
-            loop=0,
-            optimize=False,
-        )
+    buffer = BytesIO()
+    images[0].save(
+        buffer,
+        format="GIF",
+        save_all=True,
+        append_images=images[1:],
+        duration=durations,
+        loop=0,
+        optimize=False,
+    )
+    return buffer.getvalue()
 
 
 def _image(figure: Figure) -> Image.Image:

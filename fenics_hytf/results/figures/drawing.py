@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from matplotlib.figure import Figure
 
@@ -47,7 +47,7 @@ from fenics_hytf.results.reader import StoredResult
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure that was written.
+    """A figure, and what is said about it.
 
     Attributes:
         file: Its name in the result folder.
@@ -55,12 +55,14 @@ class Drawing:
         caption: What it shows, and how to read it.
         part: Where it belongs in the report: ``base``, ``motion``, ``sliding``, ``ground``,
             ``seams`` or ``loop``.
+        picture: Content of the file; empty until it is drawn.
     """
 
     file: str
     title: str
     caption: str
     part: str
+    picture: bytes = b""
 
 
 ANIMATION = Drawing(
@@ -72,23 +74,21 @@ ANIMATION = Drawing(
 
 
 def draw_figures(stored: StoredResult) -> list[Drawing]:
-    """Draw every figure that the result has data for, into its folder.
+    """Draw every figure that the result has data for; nothing is written.
 
     Args:
         stored: The result.
 
     Returns:
-        What was written, in reading order.
+        The figures with their pictures, in reading order.
     """
     drawings = []
     with style.figure_style():
         for figure, drawing in all_figures(stored):
-            style.save(figure, stored.folder / drawing.file)
-            drawings.append(drawing)
+            drawings.append(replace(drawing, picture=style.png(figure)))
         plane = plane_of(stored)
         if plane is not None and moves(stored):
-            animate(stored, plane, stored.folder / ANIMATION.file)
-            drawings.append(ANIMATION)
+            drawings.append(replace(ANIMATION, picture=animate(stored, plane)))
     return drawings
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
@@ -94,7 +95,14 @@ def save(figure: Figure, path: Path) -> None:
         path: The file.
     """
     with replacing(path) as part:
-        figure.savefig(part, metadata={"Software": "fenics_hytf"})
+        part.write_bytes(png(figure))
+
+
+def png(figure: Figure) -> bytes:
+    """A figure as the content of a PNG file."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": "fenics_hytf"})
+    return buffer.getvalue()
 
 
 def length_unit(peak: float) -> tuple[float, str]:

@@ -12,7 +12,6 @@ from html import escape
 from typing import Any
 
 from fenics_hytf.motion import GRAVITY
-from fenics_hytf.motion.files import replace_file
 from fenics_hytf.results.figures.drawing import Drawing
 from fenics_hytf.results.reader import StoredResult
 from fenics_hytf.results.report.conventions import method
@@ -35,22 +34,12 @@ from fenics_hytf.results.summary import component_peaks
 Summary = Mapping[str, Any]
 
 
-def write_report(stored: StoredResult, drawings: Sequence[Drawing]) -> None:
-    """Write the report into the result's folder.
-
-    Args:
-        stored: The result.
-        drawings: Figures in the folder, in the order to show them.
-    """
-    replace_file(stored.folder / "report.html", report(stored, drawings))
-
-
 def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
     """The report as HTML.
 
     Args:
         stored: The result.
-        drawings: Figures in the folder, in the order to show them.
+        drawings: Its figures, in the order to show them.
 
     Returns:
         The page, figures included.
@@ -58,7 +47,7 @@ def report(stored: StoredResult, drawings: Sequence[Drawing]) -> str:
     summary = stored.summary
     title = summary["title"] or "Ground response"
     figures = {
-        part: "\n".join(_figure(stored, drawing) for drawing in drawings if drawing.part == part)
+        part: "\n".join(_figure(drawing) for drawing in drawings if drawing.part == part)
         for part in ("base", "motion", "sliding", "ground", "seams", "loop")
     }
     body = [
@@ -147,11 +136,11 @@ def _warnings(warnings: Sequence[str]) -> str:
     return f'<div class="warnings">{heading}<ul>{items}</ul></div>'
 
 
-def _figure(stored: StoredResult, drawing: Drawing) -> str:
-    file = stored.folder / drawing.file
-    data = base64.b64encode(file.read_bytes()).decode("ascii")
-    lazy = ' loading="lazy"' if file.suffix == ".gif" else ""
-    source = f"data:image/{file.suffix[1:]};base64,{data}"
+def _figure(drawing: Drawing) -> str:
+    ending = drawing.file.rpartition(".")[2]
+    data = base64.b64encode(drawing.picture).decode("ascii")
+    lazy = ' loading="lazy"' if ending == "gif" else ""
+    source = f"data:image/{ending};base64,{data}"
     return (
         f'<figure><img alt="{text(drawing.title)}"{lazy} src="{source}">'
         f"<figcaption><strong>{text(drawing.title)}.</strong> {text(drawing.caption)}</figcaption>"
