@@ -241,7 +241,8 @@ def test_maps_of_a_section_leave_the_air_out(tmp_path):
     ground = (y < 12.0) | (x < 16.0) | (x > 28.0)  # a trench, 12 m wide and deep
     cells = {k: v[ground] for k, v in vars(lapse.cells).items() if v is not None}
     lapse = replace(lapse, cells=replace(lapse.cells, **cells))
-    stored = store(tmp_path / "r", replace(result, lapses=(lapse,)))
+    sizes = result.sizes | {"cells": np.count_nonzero(ground)}
+    stored = store(tmp_path / "r", replace(result, lapses=(lapse,), sizes=sizes))
     with style.figure_style():
         figure = section(stored)
         figure.canvas.draw()
