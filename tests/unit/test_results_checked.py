@@ -7,13 +7,13 @@ import json
 from pathlib import Path
 
 import pytest
+from tests.unit.results_builder import DEGRADES, make_result, make_slide
 
 from fenics_hytf.results import open_result, publish
 from fenics_hytf.results.report import document
 from fenics_hytf.results.schema import summary_faults
 from fenics_hytf.results.summary import summarise
 from fenics_hytf.scene import Scene
-from tests.unit.results_builder import DEGRADES, make_result, make_slide
 
 SCENE = """
 [mesh]
