@@ -85,7 +85,7 @@ def test_09_one_point_in_a_cell_that_shares_a_side(dim, place, figure):
     band = BAND[:: 1 if dim == 2 else 5]
     worst = max(condition(ground.A(w), 1) for w in band)
     usual = max(condition(whole.A(w), 1) for w in band)
-    figure("a side: cond₁ of A over that of whole cells", worst / usual, 4)
+    figure("beyond the case, at resonances: cond₁ over whole cells", worst / usual, 4)
     if dim == 2:  # why 2e3 is asked of A at rest, not of A at a resonance
         figure("whole cells at a resonance: cond₁ of A", usual, 2e3, at_least=True)
     largest, usual = (max(np.abs(g.nodal(w)).max() for w in band) for g in (ground, whole))
@@ -103,7 +103,7 @@ def test_09_one_point_in_a_cell_of_degree_two(dim, place, figure):
     figure("degree 2: zero modes", zero_modes(ground.K), 0)
     # Carried on by a cell, a parabola through three nodes weighs them by 3, 8 and 6.
     growth = condition(ground.K, 1) / condition(whole.K, 1)
-    figure("degree 2: cond₁ of A at rest over that of whole cells", growth, 17**2)
+    figure("beyond the case, degree 2: cond₁ of A over whole cells", growth, 17**2)
     band = BAND[:: 4 if dim == 2 else 50]
     largest, usual = (max(np.abs(g.nodal(w)).max() for w in band) for g in (ground, whole))
     figure("degree 2: |u| over that of whole cells", largest / usual, 2)

@@ -326,7 +326,7 @@ def test_18_modes_that_no_line_can_follow(name, figure):
     found = many.history("displacement")[0, 0, :2000]
     # The cut passes through a mode of the stiff column: what it leaves out is felt at seams.
     limit = 1e-3 if name == THROUGH else PEAK
-    said = "modes above the cut" if limit == PEAK else "a cut through a mode"
+    said = "modes above the cut" if limit == PEAK else "beyond the case, a cut through a mode"
     off = error(found, one.history("displacement")[0, 0])
     figure(f"{said}: 10 and 20 lapses against one", off, limit)
     worst = max(lapse.seam_error for lapse in many.lapses[1:])

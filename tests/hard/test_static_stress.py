@@ -203,7 +203,7 @@ def test_25_a_slope_that_is_squeezed_three_ways(silence, figure):
             scale = statics.unknowns.collect(weight).norm()
             return statics.unknowns.collect(weight - force).norm() / scale
 
-        name = "a squeezed slope: imbalance"
+        name = "beyond the case, a squeezed slope: imbalance"
         figure(name, imbalance(run), 0.25)
         figure(f"{name}, by shares of cells", left(gauss(share[:, None] * read)), 0.25)
         plain = B.T @ (points.volume[:, None] * points["stress"]).ravel()
