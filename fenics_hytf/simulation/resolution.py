@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import numpy.typing as npt
 
+from fenics_hytf._compat import geometry_dofmap
 from fenics_hytf.domain import Domain
 from fenics_hytf.scene import Scene, motion_band
 
@@ -73,7 +74,7 @@ def _extents(scene: Scene, domain: Domain) -> RealArray:
     Where every side is tied they travel upwards alone.
     """
     mesh = domain.mesh
-    x = mesh.geometry.x[mesh.geometry.dofmap][:, :, : domain.gdim]
+    x = mesh.geometry.x[geometry_dofmap(mesh)][:, :, : domain.gdim]
     extents = np.ptp(x, axis=1)
     kinds = [kind for name, kind in scene.supports.items() if name != "base"]
     level = kinds.count("tied") == 2 * (domain.gdim - 1)
