@@ -15,9 +15,9 @@ from fenics_hytf.motion.records import GRAVITY
 UNITS = {"g": GRAVITY, "m/s2": 1.0}
 """Factor from each unit that a CSV file may use to m/s^2."""
 
-_SQUARED = r"(?:[/_. ]?s[_ ]?-?2|[/_. ]s[/_. ]s|ps2|_per_s2)"  # over s², s/s, in words
+_SQUARED = r"(?:[/_. ]?s[_ ]?-?2|[/_. ]s[/_. ]s|ps2|[_ ]per[_ ]s2)"  # over s², s/s, in words
 _OTHER_LENGTH = r"(?:km|dm|cm|mm|ft|in)"
-_ENDS_IN_G = re.compile(r"(?:.*[^a-z])?acc[a-z.]*[_ ]+(?:in )?(m?g'?s?)")
+_ENDS_IN_G = re.compile(r"(?:(?:.*[^a-z])?acc[a-z.]*[_ /]+(?:in )?)?(m?g'?s?)")
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 _WRITTEN_OTHERWISE = str.maketrans({"²": "2", "⁻": "-", "·": ".", "^": None, "*": None})
 
@@ -55,7 +55,7 @@ def acceleration_unit(name: str) -> str | None:
         UnitError: If it states another unit, or names no acceleration.
     """
     text = _plain(name)
-    # at the end of a name one letter or two may be an index or an axis: a_g, acc_in
+    # without brackets one letter or two may be an index or an axis: a_g, acc_in, in
     words = list(_candidates(text, shortest=3))
     in_g = _ENDS_IN_G.fullmatch(text)
     if in_g:
@@ -92,17 +92,18 @@ def names_time(name: str) -> bool:
 
 def _plain(name: str) -> str:
     """A name in one way of writing; a byte that is not UTF-8 after s is the ² of Latin 1."""
-    text = name.strip()[:_LONGEST].lower().translate(_WRITTEN_OTHERWISE).replace("s\ufffd", "s2")
+    text = (
+        name.strip(' "')[:_LONGEST].lower().translate(_WRITTEN_OTHERWISE).replace("s\ufffd", "s2")
+    )
     return re.sub(r"(?<![a-z])sec(?:onds?)?(?=[^a-z]|$)", "s", text)
 
 
 def _candidates(text: str, shortest: int = 1) -> Iterator[str]:
-    """Where a unit may stand: in brackets; else the whole, or its end after ``_`` or a space."""
+    """Where a unit may stand: in brackets; else the whole or what follows a ``_`` or a space."""
     in_brackets = _BRACKETS.findall(text)
     if in_brackets:
         yield from map(str.strip, in_brackets)
         return
-    yield text
-    for cut in re.finditer("[_ ]", text):
+    for cut in re.finditer("^|[_ ]", text):
         if len(text) - cut.end() >= shortest:
             yield text[cut.end() :]

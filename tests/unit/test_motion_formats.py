@@ -121,10 +121,21 @@ SAID = [
     ("time [s],acceleration [g]", "g"),
     ("time_s,acc_g", "g"),
     ("t,G", "g"),
+    ("t / s;acceleration / g", "g"),
+    ("Time, s; Acceleration, m/s2", "m/s2"),
+    ('"time_s","acc_m_per_s2"', "m/s2"),
     ("# Time (s),Acceleration (g's)", "g"),
     ("# a record [g]\ntime_s,acceleration", "g"),
 ]
-SILENT = ["time_s,acceleration", "t,a_g", "t,acc_in", "time_s,acc (EW)", "# in Gravesend (m)\nt,a"]
+SILENT = [
+    "time_s,acceleration",
+    "t,a_g",
+    "t,acc_in",
+    "t,in",
+    "t,m",
+    "time_s,acc (EW)",
+    "# in Gravesend (m)\nt,a",
+]
 SILENT += ["# Time history, velocity to 30 cm/s\nt,a", "# Time, at a depth of 3, (m)\nt,a"]
 VALUES_OF_TWO = "\n0.0,1\n0.5,2\n"
 
