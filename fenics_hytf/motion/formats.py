@@ -97,12 +97,11 @@ def read_at2(path: str | PathLike[str]) -> Record:
         RecordError: If the file cannot be read, the header is missing, it is not in g, a value
             is not a finite number, or the number of values is not NPTS.
     """
-    lines = _lines(path)
+    lines = [_FORTRAN_EXPONENT.sub("E", line) for line in _lines(path)]
     start, num_samples, dt = _at2_header(path, lines)
     values: list[float] = []
     for number, line in enumerate(lines[start:], start=start + 1):
-        tokens = _FORTRAN_EXPONENT.sub("E", line).split()
-        values.extend(_value(path, number, token) for token in tokens)
+        values.extend(_value(path, number, token) for token in line.split())
     if len(values) != num_samples:
         raise RecordError.at(
             path,

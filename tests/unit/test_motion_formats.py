@@ -225,7 +225,9 @@ def test_a_pipe_is_not_waited_for(tmp_path):
 
 
 def test_exponents_of_fortran(write):
-    record = read_at2(write(NEW + BODY.replace("E", "D").replace("e", "d"), "a.at2"))
+    head = NEW.replace(".0050", "0.5D-02")
+    record = read_at2(write(head + BODY.replace("E", "D").replace("e", "d"), "a.at2"))
+    assert record.dt == 0.005
     assert np.array_equal(record.acceleration, GRAVITY * VALUES)
 
 
