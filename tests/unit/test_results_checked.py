@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from tests.unit.results_builder import DEGRADES, make_result, make_slide
+from support.results_builder import DEGRADES, make_result, make_slide
 
 from fenics_hytf.results import open_result, publish
 from fenics_hytf.results.report import document
