@@ -123,7 +123,7 @@ def warnings(result: Result) -> list[str]:
                 f"Effective strains reach {100 * strain:.2g} %. Above about 1 % an equivalent-"
                 "linear analysis is outside the range it was made for."
             )
-    found += [f"Of {said}." for said in result.coarse]
+    found += [f"{said[0].upper()}{said[1:]}." for said in result.coarse]
     found += _exceeded_strengths(result)
     found += _seam_warnings(result)
     found += slip_warnings(result)
