@@ -36,11 +36,16 @@ FINE, COARSE = (80, 40), (20, 10)
 WORLD = MPI.COMM_WORLD
 
 
-def layer(load: float, cells: tuple[int, int], **sections) -> Scene:
-    """A layer of ρgH/G = load, twice as long as it is high, between rollers."""
+def layer(load: float, cells: tuple[int, ...], **sections) -> Scene:
+    """A layer of ρgH/G = load, twice as long as it is high, between rollers.
+
+    Given three numbers of cells it is as deep as these make it.
+    """
     modulus = DENSITY * GRAVITY * HEIGHT / load
+    depth = [2 * HEIGHT / cells[0] * count for count in cells[1:-1]]
+    sides = ("left", "right", "front", "back")[: 2 + 2 * len(depth)]
     return scene(
-        {"box": {"size": [2 * HEIGHT, HEIGHT], "cells": list(cells), "cell": "quadrilateral"}},
+        {"box": {"size": [2 * HEIGHT, *depth, HEIGHT], "cells": list(cells)}},
         ("clay",),
         **{
             "soil": {
@@ -51,7 +56,7 @@ def layer(load: float, cells: tuple[int, int], **sections) -> Scene:
                     "damping": 0.02,
                 }
             },
-            "boundary": {"left": "roller", "right": "roller"},
+            "boundary": dict.fromkeys(sides, "roller"),
             "effects": {"gravity": True, "geometric_stiffness": True},
             "solver": {"sweep": "direct", "max_frequency": 2.0},
         }
@@ -81,10 +86,8 @@ def csc(matrix) -> sparse.csc_matrix:
     return sparse.csr_matrix((values.real.copy(), columns, start)).tocsc()
 
 
-@pytest.mark.parametrize(("cells", "expected"), [((40, 20), 1.047), (FINE, 1.021)])
-def test_23_threshold_of_the_stiffness(cells, expected, figure):
-    """By bisection with the count, beside the largest eigenvalue of −K_NL x = μ K_L x."""
-    equations, K_L, K_NL = stiffness(layer(1.0, cells))
+def threshold(K_L, K_NL) -> tuple[float, float]:
+    """ρgH/G from which the count finds a negative eigenvalue, and that by −K_NL x = μ K_L x."""
     definite, indefinite = 0.9, 1.2
     for load, negative in ((definite, False), (indefinite, True)):
         assert (negative_eigenvalues([(K_L, 1 / load), (K_NL, 1.0)]) > 0) == negative
@@ -95,12 +98,34 @@ def test_23_threshold_of_the_stiffness(cells, expected, figure):
         else:
             definite = load
     largest = eigsh(-csc(K_NL), 1, csc(K_L), which="LA", return_eigenvectors=False, tol=1e-6)[0]
+    return indefinite, 1 / largest
+
+
+@pytest.mark.parametrize(("cells", "expected"), [((40, 20), 1.047), (FINE, 1.021)])
+def test_23_threshold_of_the_stiffness(cells, expected, figure):
+    """By bisection with the count, beside the largest eigenvalue of −K_NL x = μ K_L x."""
+    equations, K_L, K_NL = stiffness(layer(1.0, cells))
+    found, exact = threshold(K_L, K_NL)
     equations.destroy()
     if cells == FINE:  # the case's own
-        figure("threshold of ρgH/G off 1.02, 80 x 40 cells", abs(indefinite - 1.02), 0.02)
-    figure("threshold off what it converges by", abs(indefinite - expected), 1e-3)
+        figure("threshold of ρgH/G off 1.02, 80 x 40 cells", abs(found - 1.02), 0.02)
+    figure("threshold off what it converges by", abs(found - expected), 1e-3)
     # twelve bisections of 0.3
-    figure("threshold off the eigenvalue", abs(indefinite - 1 / largest), 1e-4)
+    figure("threshold off the eigenvalue", abs(found - exact), 1e-4)
+
+
+def test_23_in_space(figure):
+    """Hexahedra find what quadrilaterals of their size do, and a run is told."""
+    thresholds = []
+    for cells in ((20, 10), (20, 2, 10)):
+        equations, K_L, K_NL = stiffness(layer(1.0, cells))
+        found, exact = threshold(K_L, K_NL)
+        thresholds.append(found)
+        equations.destroy()
+    figure("3D: threshold off the eigenvalue", abs(found - exact), 1e-4)
+    figure("3D: threshold above that of the section", found - thresholds[0], 1e-4)
+    with pytest.raises(SimulationError, match=r"^lapse 0: found a stiffness with \d+ negative"):
+        simulate(layer(1.02 * found, (20, 2, 10)))
 
 
 def test_23_the_count_is_that_of_all_eigenvalues(figure):

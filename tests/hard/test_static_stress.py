@@ -33,6 +33,7 @@ LAPSES, SAMPLES, DT = 50, 20, 0.01
 ROLLERS = {"left": "roller", "right": "roller"}
 SLOPE = [[0, 0], [24, 0], [24, 4], [16, 4], [8, 12], [0, 12]]
 VISCOUS = {"rayleigh": {"beta": 5e-3}}
+MESHES = Path(__file__).parents[2] / "meshes"
 QUIET = SOIL | {"damping": 0.0}
 
 
@@ -107,6 +108,27 @@ def test_24_nothing_moves_unshaken(count, silence, figure):
         assert [index for index in lapse_by_lapse(run)] == [0, 1, 2, 3]
         moved = np.abs(run.points.x - start).max() / 12.0
         figure("|Δx| over H unshaken", moved, 1e-10)
+
+
+def test_24_in_space(silence, figure):
+    """A slope of hexahedra between rollers: likewise."""
+    sides = dict.fromkeys(("left", "right", "front", "back"), "roller")
+    case = scene(
+        {"file": str(MESHES / "slope3d.msh"), "empty": ["air"]},
+        soil={"soil": QUIET},
+        motion=silence(lapses=2),
+        boundary=sides,
+        effects=VISCOUS | {"gravity": True, "convection": True},
+        lapses={"count": 2, "continuity": "transient"},
+        output={"receivers": {}},
+    )
+    with started(case) as run:
+        figure("3D: imbalance before shaking over the weight", imbalance(run), 1e-8)
+        start = run.points.x.copy()
+        assert [index for index in lapse_by_lapse(run)] == [0, 1]
+        height = np.ptp(start[:, 2])
+        moved = np.abs(run.points.x - start).max() / height
+        figure("3D: |Δx| over H unshaken", moved, 1e-10)
 
 
 def test_24_without_its_first_stress_it_sags(silence, figure, monkeypatch):
