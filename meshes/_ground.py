@@ -27,6 +27,7 @@ STYLES = ("fitted", "grid")
 _MOST_CELLS = 2_000_000
 _TRIALS = 10
 _NEAR = 0.1  # of a cell
+SMALLEST, LARGEST = 1e-6, 1e9  # of lengths [m] and velocities [m/s]
 ROUNDING = 1e-9  # of a number of cells, or of a length of the mesh
 # Ends of a cell's sides, in gmsh's order of its corners.
 _SIDES = {
@@ -198,10 +199,13 @@ class Ground:
 
 
 def positive(**values: float) -> None:
-    """Raise ValueError unless all values are positive numbers."""
+    """Raise ValueError unless all values are positive, and of a size that anything in ground has."""
     for name, value in values.items():
-        if not 0 < value < math.inf:
-            raise ValueError(f"found {name.replace('_', ' ')} {value}; expected a positive number")
+        if not SMALLEST <= value <= LARGEST:
+            raise ValueError(
+                f"found {name.replace('_', ' ')} {value}; expected a positive number, from "
+                f"{SMALLEST:g} to {LARGEST:g}"
+            )
 
 
 def run_over_rise(slope: float | None, angle: float | None, usual: float = 1.5) -> float:

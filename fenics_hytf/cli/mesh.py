@@ -153,8 +153,9 @@ def describe_mesh(path: Path) -> str:
         shape = quality(cells, "minSICN")
     finally:
         gmsh.finalize()
-    if shape.min() <= 0:
-        raise RuntimeError(f"found {(shape <= 0).sum()} inverted cells; expected none")
+    flat = (shape <= 0) | (shortest <= 0)
+    if flat.any():
+        raise RuntimeError(f"found {flat.sum()} inverted or flat cells; expected none")
     listed = ", ".join(f"{name} {number}" for name, number in numbers.items())
     ratio = (longest / shortest).max()
     return (

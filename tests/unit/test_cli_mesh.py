@@ -122,6 +122,7 @@ def test_a_file_is_replaced_only_when_told(here, hytf):
         (("slope", "--height", "tall"), "invalid float value: 'tall'"),
         (("slope", "--height"), "expected one argument"),
         (("slope", "--height", "-3"), "found height -3.0; expected a positive number"),
+        (("slope3d", "--height", "1e-300"), "expected a positive number, from 1e-06 to 1e+09"),
         (("slope", "--slope", "2", "--angle", "30"), "not allowed with"),
         (("slope", "--layers", "clay:deep", "sand"), "'clay:deep' is no NAME or NAME:TOP"),
         (("slope", "--seam", "1", "2"), "expected 5 arguments"),
