@@ -199,7 +199,7 @@ class Ground:
 
 
 def positive(**values: float) -> None:
-    """Raise ValueError unless all values are positive, and of a size that anything in ground has."""
+    """Raise ValueError unless all values are positive, of a size that anything in ground has."""
     for name, value in values.items():
         if not SMALLEST <= value <= LARGEST:
             raise ValueError(
