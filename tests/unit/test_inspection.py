@@ -22,7 +22,7 @@ CURVES = {"strain": [1e-6, 1e-4, 1e-2], "modulus": [1.0, 0.8, 0.1], "damping": [
 
 
 def scene(lapses=None, solver=None, soil=None, kinematics=None, **sections):
-    layers = [{"thickness": 8.0, "soil": "sand", "cells": 2}]
+    layers = [{"thickness": 8.0, "soil": "sand", "cells": 3}]
     mesh = {"column": {"width": 1.0, "layers": layers}}
     direction = "x"
     if kinematics:
