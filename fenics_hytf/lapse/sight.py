@@ -134,10 +134,12 @@ class _ByDirections:
         assert self._through is not None
         # All parts in one product, each part's coordinates met by the strain times its modulus.
         weighed = moduli[:, None, :, None].astype(seen.dtype) * seen[:, :, None, :]
-        return _product(weighed.reshape(*seen.shape[:2], -1), self._through)
+        count, quantities, parts, directions = weighed.shape
+        return _product(weighed.reshape(count, quantities, parts * directions), self._through)
 
 
 def _product(seen: RealArray, coordinates: RealArray) -> RealArray:
     """One product for all quantities: of stacks of small ones, each would be on its own."""
-    flat = seen.reshape(-1, seen.shape[-1]) @ coordinates
-    return flat.reshape(*seen.shape[:-1], coordinates.shape[1])
+    count, quantities, directions = seen.shape  # of ground that rests there is no direction
+    flat = seen.reshape(count * quantities, directions) @ coordinates
+    return flat.reshape(count, quantities, coordinates.shape[1])

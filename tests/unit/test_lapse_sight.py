@@ -56,3 +56,23 @@ def test_energy_on_ranks_that_share_a_mesh(figure):
             found, expected = getattr(one.energy, name), getattr(other.energy, name)
             # each sweep leaves up to its tolerance of every line
             figure(f"energy, {name}", abs(found - expected) / other.energy.input, 1e-8)
+
+
+def test_ground_that_rests_has_no_directions():
+    """Two motions of nought in a cell held all round leave a sweep without a single one."""
+    wave = {"amplitude": 0.0, "frequency": 1.25, "cycles": 1, "samples": 80}
+    held = dict(zip(("left", "right", "front", "back"), ("fixed", "roller") * 2, strict=True))
+    resting = scene(
+        {"box": {"size": [1.0, 1.0, 1.0], "cells": [1, 1, 1], "cell": "hexahedron"}},
+        ("soil",),
+        soil={"soil": SOIL},
+        motion=[{"direction": direction, "harmonic": wave} for direction in ("x", "y")],
+        boundary=held,
+        lapses={"count": 2, "continuity": "transient"},
+        effects={"calm": {"sides": ["left"], "thickness": 0.4}},
+        solver={"complex_modulus": "hysteretic"},
+        output={"receivers": {"top": [1.0, 1.0, 1.0]}},
+    )
+    for lapse in simulate(resting, MPI.COMM_SELF).lapses:
+        assert not lapse.displacement.any() and not lapse.total_acceleration.any()
+        assert not lapse.cells.peak_strain.any() and not lapse.cells.peak_stress.any()
