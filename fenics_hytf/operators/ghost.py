@@ -10,7 +10,7 @@ are penalised, up to the degree of displacement,
 
 with Ē the mean of Young's moduli of both cells (across a section of shear moduli) and h the mean of
 their sizes normal to the facet. Without the second a point left three zero modes to a cell of
-degree 2 in a section, and 21 in space; with it cond₁ of K is up to 8 and 13 times that of whole
+degree 2 in a section, and 21 in space; with it cond₁ of K is up to 7.3 and 13 times that of whole
 cells. A polynomial of that degree all over has no such jump, so ground that strains evenly does not
 feel it. There is no ghost mass in the sweep: it would put a false resonance at √(γ_K/γ_M).
 Momenta are brought to nodes with one.
